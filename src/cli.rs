@@ -634,7 +634,7 @@ pub(crate) struct Output {
 /// Path of a report. Its extension is .json or none; pipes and devices may have any name.
 fn report_path(path: PathBuf) -> Result<PathBuf, String> {
     let is_json = path.extension().is_none_or(|name| name.is_empty() || name.eq_ignore_ascii_case("json"));
-    // A pipe or device may have any name, since its reader knows the format.
+    // A pipe or device may have any name, because the name doesn't tell its reader the format.
     let is_special = || path.metadata().is_ok_and(|there| !there.is_file() && !there.is_dir());
     if is_json || is_special() {
         return Ok(path);
@@ -657,10 +657,10 @@ impl Output {
 
 const SPEED_HELP: &str = "Playback speed relative to real time, or max";
 
-/// Help on the program for campaigns.
+/// Help text of `campaign` and `batch`, which another program carries out.
 const CAMPAIGN_HELP: &str = "Done by the program headrace-campaign; it is built in lab/: cargo build --release -p headrace_campaign. \
 docs/how-to/replay-many-dives.md is its manual, --help lists its options.";
-/// Help on the program for costs.
+/// Help text of `cost`, which another program carries out.
 const COST_HELP: &str = "Done by the program headrace-cost; it is built in lab/: cargo build --release -p headrace_cost. docs/why/cost shows \
 what it finds, --help lists its options.";
 

@@ -41,10 +41,10 @@ use crate::tui;
 use crate::vehicle_file::{self, Given};
 use crate::watch::{Show, Watch};
 
-/// Speed of the replay after a demo that ran as fast as possible, relative to real time. As fast as the demo, the
+/// Speed of the replay after a demo that ran as fast as possible, relative to real time. At the demo's own speed, the
 /// replay would end before anyone could watch it.
 const REPLAY_SPEED: f64 = 20.0;
-/// A jump to the end of the log goes to this long after the last packet, so that the end is reached for certain.
+/// Time after the last packet to which a jump to the log's end leads, so that the end is reached for certain.
 const BEYOND_END: DurNs = DurNs(1_000_000_000);
 
 /// Runs `headrace demo`.
@@ -99,7 +99,7 @@ pub(crate) fn demo(args: &Demo) -> Result<u8, Failure> {
     if let Some(served) = served.filter(|_| is_replayed && !is_interrupted)
         && let Err(error) = replay_demo(args, &scene, &served, &interrupted)
     {
-        // The dive itself was complete, so the exit code stays that of the dive.
+        // The dive itself was complete, so a replay that fails doesn't change the exit code.
         complain(&format!("headrace: the page can't replay {}: {error}", log.display()));
     }
     Ok(exit_code(&report))
@@ -127,7 +127,7 @@ fn replay_demo(
         commands: (sender, commands),
         others: Some(Directors { takes_keys: false, close }),
     };
-    // The page has shown the dive's result already. A replay that was left early has no result of its own.
+    // The result of the replay is dropped, because the page has already shown the dive's result.
     playing.play(dive, &mut player, &mut watch).map(drop)
 }
 
@@ -328,7 +328,8 @@ fn claim_report(output: &Output, claims: &mut Claims) -> Result<(), Failure> {
     output.report.as_ref().map_or(Ok(()), |report| claims.claim("--report", report, Kind::Report))
 }
 
-/// Checks that a replay's outputs can be written. The golden report is an input, or with --bless an output.
+/// Checks that a replay's outputs can be written. The golden report (the report to compare with) is an input, or with
+/// --bless an output.
 fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(), Failure> {
     let read = args.expect.iter().filter(|_| !args.bless);
     let inputs = logs.iter().chain(&given.files).chain(read).cloned().chain(args.page.files());
@@ -338,8 +339,8 @@ fn claim_of_replay(args: &Replay, logs: &[PathBuf], given: &Given) -> Result<(),
     blessed.map_or(Ok(()), |golden| claims.claim("--expect", golden, Kind::Report))
 }
 
-/// Overrides settings of the vehicle file by the options. Of several targets or section lengths, the dive itself has
-/// the first. `other_targets` judges the others.
+/// Overrides settings of the vehicle file by the options. If the options give several targets or section lengths, the
+/// dive itself uses the first. The module `other_targets` judges the others.
 fn set(args: &Replay, vehicle: &mut VehicleConfig) {
     vehicle.target.max_hole_m = args.target.first().copied().unwrap_or(vehicle.target.max_hole_m);
     vehicle.section_m = args.section.first().copied().unwrap_or(vehicle.section_m);

@@ -60,7 +60,7 @@ fn deliver_to(
     player.connect(dive.armed.sources());
     let mut wall = Wall::new(&dive.armed);
     let program = concat!("headrace ", env!("CARGO_PKG_VERSION")).to_owned();
-    // Date and identity follow from the replay.
+    // Date and identity are set after the replay, from which they follow.
     let info = FileInfo { title: about.title(), program, date: None, id: [0; 16] };
     let mut collector = Collector::new(unfinished, &info)?;
     let feed = (&mut player as _, Pace::default());
@@ -158,7 +158,7 @@ fn publish(unfinished: &Path, folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Facts for the cover: those of the options, or else those of the file.
+/// Facts for the report's cover. Options take precedence over the file.
 fn about(args: &Deliver) -> Result<About, Failure> {
     let file = args.about.as_deref().map(read_about).transpose()?.unwrap_or_default();
     let crew = (!args.crew.is_empty()).then(|| args.crew.join(", "));

@@ -40,11 +40,12 @@ use crate::watch::Watch;
 
 /// Capacity of the queue of notices to the terminal.
 ///
-/// A tick of 20 ms has only a few notices. A place in the queue takes about 400 bytes, allocated when the loop is
-/// armed.
+/// A tick (one run of the loop, every 20 ms) has only a few notices. A place in the queue takes about 400 bytes,
+/// allocated before the dive begins.
 const NOTICES: usize = 1 << 10;
 
-/// Metadata keys of a log. Their values are one moment on two clocks: the log's clock and UTC, both in nanoseconds.
+/// Metadata keys of a log. Their values state the same moment on two clocks: the log's clock and UTC, both in
+/// nanoseconds.
 pub(crate) const CLOCK_ANCHOR: [&str; 2] = ["clock_anchor_monotonic_ns", "clock_anchor_utc_ns"];
 
 /// Metadata keys of a live dive's log: the boot in which the log was recorded, and how far the dive's clock was ahead
@@ -53,7 +54,7 @@ pub(crate) const BOOT: [&str; 2] = ["boot_id", "clock_ahead_ns"];
 /// Function that is called after every tick.
 type AfterTick<'a> = &'a mut dyn FnMut(&Loop);
 
-/// An armed loop with the vehicle's sensors, and the consumers of its results.
+/// A loop that is ready to run with the vehicle's sensors, and the consumers of its results.
 pub(crate) struct Dive {
     pub(crate) armed: Loop,
     notices: NoticeReceiver,
@@ -68,7 +69,7 @@ pub(crate) struct Dive {
 struct Operator {
     input: ConsoleInput,
     port: ConsolePort,
-    /// The latest state of the recordings that the loop was told: whether a recording is failing.
+    /// Whether a recording is failing, as the loop was last told.
     fails: bool,
 }
 
@@ -99,12 +100,12 @@ impl<'a> Recording<'a> {
     }
 }
 
-/// Clock that gives a dive its timestamps.
+/// Clock by which a dive's timestamps are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Clock {
     /// This machine's monotonic clock.
     Ours,
-    /// Clock of a recorded or simulated dive.
+    /// Clock of a recorded or simulated dive, whose timestamps are already in the data.
     Theirs,
 }
 
@@ -187,7 +188,7 @@ fn record(
     Ok(Recordings::of(recorders, is_live))
 }
 
-/// Arms the loop, which allocates all its memory.
+/// Allocates all memory of the loop, so that it can run.
 fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Result<Loop, Failure> {
     let armed = app.arm(navigation)?;
     if tracing::enabled!(tracing::Level::INFO) {
@@ -198,7 +199,7 @@ fn arm(app: App, vehicle: &VehicleConfig, navigation: Box<dyn Navigation>) -> Re
     Ok(armed)
 }
 
-/// Size of all sensors' ring buffers, bytes.
+/// Total size of the ring buffers of all sensors, bytes.
 fn ring_bytes(vehicle: &VehicleConfig) -> usize {
     vehicle.sensors.iter().map(|sensor| sensor.specification().ring_bytes).sum()
 }
@@ -239,7 +240,7 @@ pub(crate) fn view_site(vehicle: &VehicleConfig) -> Site {
     }
 }
 
-/// Stores the UTC time that corresponds to the clock of the timestamps.
+/// Stores the UTC that corresponds to the monotonic clock in the log's header.
 fn anchor(header: &mut LogHeader) {
     let (monotonic, utc) = headrace_ports::clock_anchor();
     let [of_clock, of_utc] = CLOCK_ANCHOR.map(str::to_owned);
@@ -250,7 +251,7 @@ fn anchor(header: &mut LogHeader) {
     header.metadata.insert(ahead, headrace_ports::ahead().0.to_string());
 }
 
-/// A loop without outlets. It gives the same results as one that is recorded.
+/// A loop whose results nobody receives. It gives the same results as a recorded loop.
 pub(crate) fn silent(vehicle: &VehicleConfig) -> Result<Loop, Failure> {
     memory::check_room(ring_bytes(vehicle), vehicle.tunnel.length_m)?;
     let mut app = App::new(vehicle.mission());
@@ -383,7 +384,7 @@ impl Dive {
         drop(progress);
         drop(phase);
         if let Err(error @ DriveError::Panicked { .. }) = driven {
-            // After a panic, parts of the loop are missing, so there is no report.
+            // After a panic, parts of the loop's state are missing, so there is no report.
             return Err(error.into());
         }
         let report = self.end(watch, beside);
@@ -414,8 +415,8 @@ impl Dive {
         }
     }
 
-    /// Rebuilds the state that the dive had before the interruption. Meanwhile packets of the ports are only recorded.
-    /// Returns false if `ended` returns true before the state is rebuilt.
+    /// Rebuilds the state that the dive had before the interruption. Meanwhile, packets from the ports are recorded but
+    /// not processed. Returns false if `ended` returns true before the state is rebuilt.
     ///
     /// If the log can't be read, the dive goes on without the earlier part, and the report says so. If the dive ends
     /// before its state is rebuilt, the recording can be continued.
@@ -545,7 +546,7 @@ impl Dive {
         // This tick sends the verdicts of the dive's last sections to the recording.
         let now = self.armed.now();
         self.armed.tick(now);
-        // The samples are no longer needed. They are freed before the report is made, since the report of a long dive
+        // The samples are no longer needed. They are freed before the report is made, because the report of a long dive
         // takes as much memory as the samples.
         self.armed.release_samples();
         let mut report = Report::of(&self.armed);

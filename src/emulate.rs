@@ -29,10 +29,10 @@ use stand::{OFF, Stand};
 
 /// Longest wait for bytes from a host, ns. It limits the delay of a measurement.
 const WAIT_NS: u32 = 1_000_000;
-/// Delays of a device's data, in the order in which a key selects them.
+/// Delays of a device's data that the key for delays selects in turn.
 const DELAYS: [DurNs; 3] = [DurNs(500_000_000), DurNs(2_000_000_000), DurNs(10_000_000_000)];
 
-/// Time for which a key holds back the data of all devices.
+/// Time for which the key for holding back stops the data of all devices.
 const HELD: DurNs = DurNs(1_300_000_000);
 
 /// Runs `headrace emulate`.
@@ -90,7 +90,7 @@ fn claim(scene: &Scene, args: &Emulate, vehicle_file: &Path, beside: &Beside) ->
     Ok(())
 }
 
-/// Whether a file equals one that an earlier rehearsal has written. Such a file may be overwritten.
+/// Whether a file has this content, as written by an earlier rehearsal. Such a file may be overwritten.
 fn holds(path: &Path, content: &str) -> bool {
     std::fs::read(path).is_ok_and(|there| there == content.as_bytes())
 }
@@ -123,7 +123,7 @@ fn stands(scene: &Scene, args: &Emulate) -> Result<Vec<Stand>, Failure> {
     Ok(stands)
 }
 
-/// Writes the vehicle file and the files that it refers to.
+/// Writes the vehicle file and the other files that it refers to.
 fn write_vehicle(scene: &Scene, stands: &[Stand], folder: &Path, file: &Path) -> Result<(), Failure> {
     let ids = scene.vehicle.sensor_configs.iter().map(|config| &config.id);
     let changed =
@@ -174,7 +174,7 @@ struct Rehearsal<'a> {
     /// Time on this machine's clock at which the simulation started.
     origin: MonoNs,
     inputs: Receiver<Input>,
-    /// Number of the device that the keys change.
+    /// Number of the device to which the keys apply.
     chosen: usize,
     is_frozen: bool,
     is_ended: bool,
@@ -355,7 +355,7 @@ fn tell(id: &str, text: &str) {
     say(&format!("{id:<12} {text}"));
 }
 
-/// The delay that comes after `delay` when the key is pressed once more.
+/// Delay that the key for delays selects after the delay `delay`.
 fn next_delay(delay: DurNs) -> DurNs {
     DELAYS.into_iter().find(|next| *next > delay).unwrap_or(DurNs(0))
 }

@@ -1,4 +1,4 @@
-//! Compares a report with a golden one.
+//! Compares a report with a golden report, which states the expected results.
 
 use std::path::Path;
 
@@ -60,7 +60,7 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
             if let (Some(stated), Some(report)) = (stated, got.as_object_mut()) {
                 report.insert(TOLERANCES.to_owned(), stated);
             }
-            // Keys missing in a golden report of an earlier version are added.
+            // Keys that a golden report of an earlier version doesn't have are added.
             let is_new = |key: &String| before.get(key).is_none();
             if !differs && !got.as_object().is_some_and(|got| got.keys().any(is_new)) {
                 complain(&format!("{}: unchanged", golden.display()));
@@ -80,7 +80,7 @@ pub(crate) fn bless(report: &Report, golden: &Path) -> Result<(), Failure> {
 /// allowed difference of two numbers, or `"any"`.
 const TOLERANCES: &str = "tolerances";
 
-/// Tolerances by path; `None` allows any difference.
+/// Allowed differences by path; `None` allows any difference.
 #[derive(Debug, Default)]
 struct Allowed(Vec<(Vec<String>, Option<f64>)>);
 
@@ -154,8 +154,8 @@ fn tell(expected: &Value, got: &Value, allowed: &Allowed) -> bool {
     !differences.is_empty()
 }
 
-/// Order of the list: the report as a whole, the verdicts of sections, other differences of sections, and
-/// everything else.
+/// Position of a difference in the list, which has this order: the report as a whole, the verdicts of sections, other
+/// differences of sections, and everything else.
 fn rank(difference: &str) -> u8 {
     let path = difference.split(": ").next().unwrap_or_default();
     match path {
@@ -166,7 +166,7 @@ fn rank(difference: &str) -> u8 {
     }
 }
 
-/// Name of an entry in a list. It is the entry's index, or the bounds of a section.
+/// Name of an entry in a list. The name of a section is its bounds; other entries are named by index.
 fn entry_name(index: usize, entry: &Value) -> String {
     let metres = |key: &str| entry.get(key).and_then(Value::as_f64);
     match (metres("start_m"), metres("end_m")) {

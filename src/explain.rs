@@ -1,5 +1,5 @@
-//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and the change in results without
-//! each effect.
+//! `headrace simulate --explain`: lists the simulated effects, the reasons for them, and how the results change if an
+//! effect is left out.
 
 use headrace_replay::effect_influence::{
     EffectInfluence, HOLE_LIMIT_M, LeftOut, Mean, PASSED_LIMIT, measure,
@@ -25,7 +25,7 @@ pub(crate) fn worth_of(scenes: &mut [Scene]) -> Result<EffectInfluence, Failure>
     })?)
 }
 
-/// Lists a scene's systems, components and random streams, and the used and unused effects.
+/// Lists a scene's systems, components and random streams, and the effects that it uses and doesn't use.
 ///
 /// Adds the worth (influence and cost) of each effect if it was measured.
 pub(crate) fn explain(scene: &Scene, worth: Option<&EffectInfluence>, as_json: bool) -> Result<u8, Failure> {
@@ -109,8 +109,9 @@ fn worth_in_json(worth: &EffectInfluence) -> Value {
     })
 }
 
-/// Text about the cost of each effect and its influence on the results. First comes the cheapest set of effects that
-/// keeps D and the passed share within their limits. Then comes each effect, the most expensive first.
+/// Text about the cost of each effect and its influence on the results. The text begins with the cheapest set of
+/// effects that keeps the hole diameter D and the passed share within their limits. Each effect follows, the most
+/// expensive first.
 fn worth_in_words(worth: &EffectInfluence) -> String {
     let kept =
         worth.each.iter().flat_map(|out| &out.effects).filter(|name| !worth.spared.effects.contains(name));
@@ -170,7 +171,7 @@ fn called_in_words(called: &[Called]) -> String {
     text
 }
 
-/// Reasons that call for an effect, as text. Only the first three are listed.
+/// Reasons why the scene calls for an effect, as text. Only the first three are listed.
 fn by(callers: &[String]) -> String {
     const SHOWN: usize = 3;
     let shown = callers.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("; ");

@@ -71,7 +71,7 @@ pub(crate) fn export(args: &Export) -> Result<u8, Failure> {
     Ok(exit_code(&report))
 }
 
-/// Recordings of the dive's voice notes that fit into a page, and the number of recordings left out.
+/// Recordings of the dive's voice notes that fit into a page, and the number of recordings that don't fit.
 fn voices(files: &[PathBuf], report: &Report) -> Result<(Vec<Voice>, u64), Failure> {
     let (mut voices, mut bytes, mut left_out): (Vec<Voice>, _, _) = (Vec::new(), 0, 0);
     // Without voice notes, as in most dives, the log needn't be read again.

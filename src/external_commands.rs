@@ -1,5 +1,5 @@
-//! Commands that programs of `lab/` provide, like git's subcommands. This program thus needs neither an SQL engine nor
-//! the reference computations of `headrace cost`.
+//! Commands that programs of `lab/` provide, in the same way as git's subcommands. The program `headrace` itself thus
+//! needs neither an SQL engine nor the reference computations of `headrace cost`.
 
 use std::ffi::OsStr;
 use std::io::ErrorKind;
@@ -9,7 +9,7 @@ use std::process::Command;
 use crate::cli::ExternalArguments;
 use crate::failure::{self, Failure};
 
-/// A program of `lab/`, and the package that contains the program.
+/// A program of `lab/`, and the Cargo package from which it is built.
 pub(crate) struct Program {
     name: &'static str,
     package: &'static str,

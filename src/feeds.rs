@@ -8,7 +8,7 @@ use headrace_monitor::ring::{Port, RingError};
 use headrace_replay::drive::{Coming, PacketSource};
 use headrace_replay::log::LogError;
 
-/// A packet source that ends when the flag `interrupted` is set.
+/// A packet source that ends as soon as the flag `interrupted` is set.
 pub(crate) struct Interruptible<'a> {
     pub(crate) feed: &'a mut dyn PacketSource,
     pub(crate) interrupted: &'a AtomicBool,
@@ -52,7 +52,7 @@ impl PacketSource for Followed<'_> {
     }
 }
 
-/// Passed share of a time span, 0 to 1; `None` without a span.
+/// Share of a time span that has passed at `at`, 0 to 1; `None` without a span.
 pub(crate) fn share(span: Option<(MonoNs, MonoNs)>, at: MonoNs) -> Option<f64> {
     let (from, to) = span?;
     let whole_s = to.since(from).as_secs_f64();

@@ -21,7 +21,8 @@ pub(crate) trait Follower {
     fn notice(&mut self, _notice: &Notice, _dive: &Loop) {}
     /// Called after every tick, even without packets.
     fn tick(&mut self, dive: &Loop);
-    /// Called after a tick that belongs to a jump. The notices of such a tick aren't shown.
+    /// Called after each tick that playback runs without showing it, because it jumps to a later time. The notices of
+    /// such a tick aren't shown.
     fn skipped(&mut self, _dive: &Loop) {}
     /// Called when a replay pauses or resumes, or its speed changes.
     fn mode(&mut self, _paused: bool, _speed: Option<f64>) {}

@@ -73,7 +73,7 @@ impl Followers {
         Ok(Self { tui: asked.tui, mavlink_out, foxglove: asked.foxglove })
     }
 
-    /// Kind of display on stdout. `otherwise` applies if no follower uses the terminal.
+    /// Kind of display on stdout. It is `otherwise` if no follower uses the terminal.
     pub(crate) fn show(&self, otherwise: Show) -> Show {
         if self.tui { Show::Followers } else { otherwise }
     }

@@ -1,4 +1,5 @@
-//! `--foxglove`: sends the viewer messages of a recording live, with Foxglove's own server.
+//! `--foxglove`: sends the messages for viewers, which a recording also has, while the dive runs, with Foxglove's own
+//! server.
 //!
 //! A separate thread builds the messages, like the recorder's thread for a log. The loop's thread only copies the
 //! results of each tick.
@@ -207,7 +208,7 @@ impl Server {
         }
         self.view.end(&mut self.made);
         self.show();
-        // Messages that are being sent get some time to arrive.
+        // The wait gives messages that are being sent some time to arrive.
         thread::sleep(ENDS_WITHIN);
         drop(self.handle.stop());
     }

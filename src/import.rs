@@ -231,7 +231,7 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
     }
 }
 
-/// Error for a file of the wrong kind. The text names the kind that the file seems to be.
+/// Error for a file of the wrong kind. The text names the kind of file that it seems to be.
 fn named(path: &Path, problem: &str) -> Failure {
     let front = match front_of(path) {
         Ok(front) => front,

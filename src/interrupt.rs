@@ -1,4 +1,4 @@
-//! Signals. They let a dive end in an orderly way, and only on request.
+//! Handles signals, so that a dive ends in an orderly way and only on request.
 
 use std::io::Read as _;
 use std::os::unix::net::UnixStream;
@@ -33,7 +33,8 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Counts a request to end the program that arrives now. Returns whether it is the second request.
+    /// Counts a request to end the program that arrives now. Returns whether it is a second request, rather than a
+    /// repetition of the first.
     #[expect(clippy::disallowed_methods, reason = "how long somebody waits to ask again is wall time")]
     pub(crate) fn is_second_now(&mut self) -> bool {
         self.is_second(Instant::now())
@@ -52,8 +53,8 @@ impl Requests {
 pub(crate) fn flag() -> Result<Arc<AtomicBool>, Failure> {
     let flag = ending()?;
     on(SIGHUP, &flag)?;
-    // Without a handler of SIGXFSZ, a write beyond the limit of file sizes would end the program. This also holds for a
-    // dive from a log or a simulation.
+    // Without a handler of SIGXFSZ, a write beyond the limit of file sizes would end the program. The handler is also
+    // needed for a dive from a log or a simulation.
     on(SIGXFSZ, &Arc::default())?;
     Ok(flag)
 }
@@ -71,7 +72,7 @@ pub(crate) fn flag_of_a_dive() -> Result<Arc<AtomicBool>, Failure> {
 /// program ends.
 static LEFT_TO_KEYS: AtomicBool = AtomicBool::new(false);
 
-/// Leaves a second SIGINT or SIGTERM to the thread that reads the stream from [`seconds`]. That thread ends
+/// Leaves a second SIGINT or SIGTERM to the thread that reads the stream which [`seconds`] creates. That thread ends
 /// the program.
 pub(crate) fn leave_second_to_keys() {
     LEFT_TO_KEYS.store(true, Ordering::Relaxed);
@@ -102,7 +103,8 @@ fn ending() -> Result<Arc<AtomicBool>, Failure> {
     Ok(flag)
 }
 
-/// Sets `armed` as soon as another request to end the program no longer counts as a repetition of the first.
+/// Sets `armed` once repetitions of the first request have ended, so that another request to end the program counts as
+/// a second one.
 fn arm_later(armed: Arc<AtomicBool>) -> Result<(), Failure> {
     let mut signals = seconds().map_err(failed)?;
     let wait = move || {

@@ -37,7 +37,7 @@ pub(crate) struct Earlier {
 }
 
 impl Earlier {
-    /// Adds the earlier parts to the report's entry for the recording that continues them.
+    /// Adds the earlier parts to the report about the recording that continues them.
     pub(crate) fn complete(self, log: &mut LogReport) {
         log.losses.splice(0..0, self.losses);
         if self.files.is_empty() {

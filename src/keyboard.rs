@@ -23,7 +23,7 @@ const WAIT: Timespec = Timespec { tv_sec: 0, tv_nsec: 200_000_000 };
 /// The system stops a background job that reads its terminal or changes the terminal's settings.
 pub(crate) fn is_ours() -> bool {
     let stdin = io::stdin();
-    // A terminal that doesn't control this process has no foreground job, and stops nobody.
+    // A terminal that doesn't control this process has no foreground job, so reading it stops no process.
     stdin.is_terminal() && tcgetpgrp(&stdin).map_or(true, |group| group == getpgrp())
 }
 

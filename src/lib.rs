@@ -81,7 +81,8 @@ pub fn main() -> ExitCode {
     }
     terminal::be_quiet(cli.verbosity.is_quiet());
     terminal::be_verbose(cli.verbosity.is_verbose());
-    // A dive doesn't fail if its output is lost. No other command fails because its terminal was closed.
+    // A command fails if its output is lost, with two exceptions: a dive never fails for this reason, and no command
+    // fails because its terminal was closed.
     let needs_output = !matches!(cli.command, Command::Run(_)) && !std::io::stdout().is_terminal();
     let result = match cli.command {
         Command::Demo(demo) => commands::demo(&demo),

@@ -57,7 +57,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let (is_served, recording_is_on) = (page::is_wanted(&args.page, true), recording.is_some());
     let mut dive =
         Assembly::of(vehicle, text).recorded(recording).kept(is_served).assemble()?.operated(Clock::Ours);
-    // After a restart, the recordings come in another order. The states stay beside the same one.
+    // After a restart, the recordings may come in another order. The smallest path is chosen, so that the saved states
+    // stay beside the same recording.
     if let (Some(log), true) = (logs.iter().min(), recording_is_on) {
         dive.keep_states(log);
     }
@@ -264,7 +265,7 @@ fn new_log() -> PathBuf {
     PathBuf::from(format!("dive-{}.mcap", utc.0 / 1_000_000_000))
 }
 
-/// States of the sensors' ports.
+/// State of each sensor's port, and the deadline of required sensors.
 struct SensorStates {
     ids: Vec<String>,
     words: Vec<String>,

@@ -63,7 +63,7 @@ fn filter(level: Option<LevelFilter>, variable: Option<&str>) -> (Targets, Optio
     (filter, error)
 }
 
-/// Maximum number of log lines in the queue for stderr.
+/// Maximum number of log lines that wait to be written to stderr.
 const WAITING: usize = 1 << 10;
 /// Longest wait at the end of a dive until the queued lines are written to stderr.
 const ENDS_WITHIN: Duration = Duration::from_secs(2);
@@ -77,8 +77,8 @@ struct Background {
 
 enum Line {
     Text(Vec<u8>),
-    /// Marks a place in the queue. When all earlier lines have been written, the mark is dropped, which
-    /// disconnects its channel.
+    /// Marks a place in the queue. When all earlier lines have been written, the writing thread drops the mark. The
+    /// mark's channel is then disconnected.
     Mark(Sender<()>),
 }
 
@@ -203,8 +203,8 @@ fn pass(bytes: &[u8]) {
 
 /// Writes bytes to stderr at once, unless the screen of `--tui` uses the terminal.
 ///
-/// Stderr is shared with self-overwriting lines. Failed writes are ignored: a closed stderr must not end a
-/// dive.
+/// Other output on stderr may be a line that overwrites itself, such as progress. Failed writes are ignored: a closed
+/// stderr must not end a dive.
 fn write_now(bytes: &[u8]) {
     if let Some(held) = HELD.get().filter(|held| held.is_on.load(Ordering::Relaxed)) {
         held.shown.force_push(plain(bytes));
@@ -246,7 +246,7 @@ fn event(bytes: &[u8]) -> String {
     fit + end
 }
 
-/// Stderr, for log messages.
+/// Writer of log messages to stderr.
 struct Stderr;
 
 impl MakeWriter<'_> for Stderr {
@@ -261,7 +261,7 @@ impl MakeWriter<'_> for Stderr {
     }
 }
 
-/// Stderr, for a log message of a level.
+/// Writer of one log message to stderr; the field is the message's level.
 struct LevelWriter(Level);
 
 impl Write for LevelWriter {

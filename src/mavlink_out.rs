@@ -165,7 +165,8 @@ fn send_all(socket: &UdpSocket, to: &str, frames: &Receiver<Vec<u8>>) {
     let mut failed: u64 = 0;
     for frame in frames {
         if let Err(error) = socket.send_to(&frame, to) {
-            // Nobody listens, or there is no route. The dive goes on, and the fault may pass.
+            // The error means that nobody listens, or that there is no route. The dive goes on, because the fault may
+            // pass.
             if failed == 0 {
                 tracing::warn!(%error, to, "MAVLink can't be sent; retrying");
             }

@@ -6,14 +6,14 @@ use crate::failure::Failure;
 
 /// Address space that a dive needs besides the ring buffers of its sensors and the tunnel, bytes.
 ///
-/// With less, replays of a vehicle with two heads abort in a tunnel of 100 m. The figure was measured in steps of 10 MB
-/// of `ulimit -v`. Most of this space is never used.
+/// With less address space, replays of a vehicle with two heads abort in a tunnel of 100 m. The figure was measured in
+/// steps of 10 MB of `ulimit -v`. Most of this space is never used.
 const DIVE_BYTES: usize = 232 << 20;
 /// Address space for each metre of tunnel, bytes: the largest of six measurements with tunnels of 1 to 20 km (28 to 69
 /// KiB).
 const TUNNEL_BYTES_PER_M: f64 = 70.0 * 1024.0;
-/// Length of the allocations that are tried, bytes. One large allocation would be refused if it exceeds the machine's
-/// memory, even if most of it is never used.
+/// Length of each allocation by which the check tries the address space, bytes. One large allocation would be refused
+/// if it exceeds the machine's memory, even if most of it is never used.
 const PIECE_BYTES: usize = 32 << 20;
 
 /// Checks that the system has the address space for a dive. Without the check, an allocation would fail later

@@ -1,4 +1,4 @@
-//! `replay` with several targets or section lengths: verdicts for each of them.
+//! `replay` with several targets or section lengths: verdicts for each combination of them.
 
 use std::path::PathBuf;
 

@@ -100,7 +100,7 @@ struct Unheld {
 
 impl Unheld {
     fn start() -> io::Result<Self> {
-        // The channel has no buffer, so a piece of output is taken only when the previous piece has been written.
+        // The channel has no buffer, so the thread takes a piece of output only when it has written the previous piece.
         let (pieces, queue) = bounded::<Vec<u8>>(0);
         let (ended, done) = bounded(1);
         let write = move || {
@@ -148,7 +148,7 @@ impl Write for Unheld {
     }
 }
 
-/// Writes `text` unchanged, however long that takes. Otherwise like [`put`].
+/// Writes `text` unchanged, as [`put`] does, but waits as long as the write takes.
 ///
 /// Only for a thread for which no other thread waits.
 pub(crate) fn put_waiting(text: &str) {
@@ -210,7 +210,7 @@ pub(crate) fn say(text: &str) {
     put(&format!("{}\n", one_line(text)));
 }
 
-/// Writes a line, and removes a transient status line first. May be called from any thread.
+/// Writes a line, and first removes a status line that would be overwritten anyway. May be called from any thread.
 pub(crate) fn aside(text: &str) {
     let clear = if terminal::take_transient() { terminal::CLEAR } else { "" };
     put(&format!("{clear}{}\n", one_line(text)));
@@ -249,7 +249,7 @@ fn taken(written: io::Result<()>) -> Result<(), Failure> {
     }
 }
 
-/// Writes a report as JSON, without holding the whole text in memory.
+/// Writes a report to stdout as JSON, without holding the whole text in memory.
 ///
 /// Errors: see [`deliver`].
 pub(crate) fn deliver_json(report: &Report) -> Result<(), Failure> {
@@ -267,7 +267,8 @@ struct Plain<W>(W);
 
 impl<W: Write> Write for Plain<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        // An incomplete character stays with the caller, who writes it again with the next bytes.
+        // The bytes of an incomplete character are not taken, so the caller passes them again together with the next
+        // bytes.
         let whole = match str::from_utf8(bytes) {
             Ok(text) => text,
             Err(error) if error.valid_up_to() > 0 => bytes

@@ -29,7 +29,8 @@ pub(crate) const TRUTH: &str = "# true values: ";
 /// Text that every report contains.
 const REPORT: &str = "\"report_version\":";
 
-/// A kind of output file. An existing file of the same kind is overwritten. Other files need `--force`.
+/// A kind of output file. An existing file of the same kind is overwritten. Any other existing file is overwritten only
+/// with `--force`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Report,
@@ -46,7 +47,8 @@ pub(crate) enum Kind {
     Page,
     /// A file of a delivery, which is written into an empty folder.
     Delivered,
-    /// The recording of a voice note. The file doesn't show to which note it belongs.
+    /// The recording of a voice note. An existing recording is never of the same kind, because it doesn't show to which
+    /// note it belongs.
     Voice,
     /// A vehicle file. People edit it.
     Vehicle,
@@ -127,7 +129,7 @@ fn ends(path: &Path, mark: &str) -> bool {
 fn may_write(path: &Path, kind: Kind, force: bool) -> Result<(), Failure> {
     let failed = |source| Failure::Unwritable { path: path.to_owned(), source };
     if path.symlink_metadata().is_err() {
-        // Only creating the file shows for certain that it can be created.
+        // The file is created and removed again, because no other check shows for certain that it can be created.
         OpenOptions::new().write(true).create_new(true).open(path).map_err(failed)?;
         return std::fs::remove_file(path).map_err(failed);
     }

@@ -47,7 +47,7 @@ use crate::report_output::exit_code;
 
 /// Interval at which a paused replay checks for an interruption.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// Number of stops of a playback that begins with a jump to the end of the log: the jump and the end.
+/// Number of times that a playback stops if it begins with a jump to the log's end: after the jump and at the end.
 const STOPS_TO_END: u8 = 2;
 /// Error text for a command to playback.
 const NO_PLAYBACK: &str = "no playback is running that could be controlled";
@@ -198,7 +198,7 @@ fn hosts(args: &PageArgs) -> Vec<String> {
     own.chain([BLUEOS.to_owned()]).chain(args.page_host.iter().cloned()).collect()
 }
 
-/// Address of the page, as text. Its tokens are shown only on a terminal, and are never logged.
+/// Address of the page, as text. The tokens in it are shown only on a terminal, and are never logged.
 fn opening_text(page: &Page, tokens: Option<&Tokens>) -> String {
     let (scheme, at) = (page.scheme(), page.address());
     let host = if at.ip().is_unspecified() { own_address(at.ip()) } else { at.ip() };
@@ -214,7 +214,7 @@ fn opening_text(page: &Page, tokens: Option<&Tokens>) -> String {
     lines
 }
 
-/// Address by which other machines reach this machine. Finding it sends nothing.
+/// Address by which other machines reach this machine. No packet is sent to find it.
 fn own_address(unspecified: IpAddr) -> IpAddr {
     let (any, beyond) =
         if unspecified.is_ipv4() { ("0.0.0.0:0", "192.0.2.1:9") } else { ("[::]:0", "[2001:db8::1]:9") };
@@ -404,7 +404,7 @@ impl Served {
             while !interrupted.load(Ordering::Relaxed) {
                 std::thread::sleep(LOOK_EVERY);
             }
-            // The command fails if playback has ended already.
+            // Sending fails if playback has ended already, which does no harm.
             let _ended = sender.send(PlaybackCommand::End);
         });
         None
@@ -452,7 +452,7 @@ struct PageFollower {
     now: MonoNs,
     /// Playback that the page controls; `None` for a page in a file.
     directed: Option<Arc<Directed>>,
-    /// Number of stops for which the page shows the finished dive instead of the replay.
+    /// Number of coming stops of the replay at which the page goes on showing the finished dive.
     ignored_stops: u8,
 }
 

@@ -1,4 +1,4 @@
-//! Phases of a command, logged with their durations.
+//! Phases of a command, each logged with its duration.
 
 use std::time::Instant;
 

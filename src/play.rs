@@ -65,12 +65,12 @@ impl Playing {
             let mut playback = Playback::new(armed, player, store, pace)?;
             screen.clock = playback.dive_clock();
             if let Some(from) = from {
-                // The jump is a command, so that followers show the state after it, as after any other jump. Sending
-                // can't fail, because the receiver lives as long as this function.
+                // The jump is a command, so that followers (such as the page) show the state after it, as after any
+                // other jump. Sending can't fail, because the receiver lives as long as this function.
                 let _received = sender.send(PlaybackCommand::Seek(screen.clock.timestamp(from)));
             }
             screen.watch.mode(false, pace.speed);
-            // A terminal gives keys; a pipe or a file gives lines.
+            // A terminal gives single keys; a pipe or a file gives lines.
             let keyboard = match interactive {
                 true if has_keys => Some(keys::listen(sender, pace.speed)?),
                 true => {

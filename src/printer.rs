@@ -14,7 +14,7 @@ const WAITING: usize = 1 << 10;
 
 enum Message {
     Line(String),
-    /// A line that the next one overwrites.
+    /// A line of state, which the next line overwrites.
     Status(String),
 }
 
@@ -30,8 +30,8 @@ pub(crate) struct Printer {
 }
 
 impl Printer {
-    /// Starts the thread. A `lossy` printer never waits. It drops and counts lines that find no room in the
-    /// queue.
+    /// Starts the thread. A `lossy` printer never makes its caller wait. It drops and counts lines that find no room in
+    /// the queue.
     pub(crate) fn start(lossy: bool) -> Self {
         let (sender, messages) = bounded(WAITING);
         // If the thread can't be started, all lines are dropped, which is reported at the end of the dive.
@@ -54,7 +54,7 @@ impl Printer {
         self.send(Message::Line(text));
     }
 
-    /// Shows a line that the next one overwrites.
+    /// Shows a line of state, which the next line overwrites.
     pub(crate) fn status(&mut self, text: String) {
         self.send(Message::Status(text));
     }
@@ -103,7 +103,7 @@ impl Drop for Printer {
 fn print(messages: &Receiver<Message>) {
     let mut has_status = false;
     let close = |has_status: &mut bool| {
-        // If a log message has cleared the status line already, there is nothing to clear.
+        // A log message may have cleared the status line already, so the flag is checked.
         if core::mem::take(has_status) && terminal::take_transient() {
             put_waiting(terminal::CLEAR);
         }

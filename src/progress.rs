@@ -13,7 +13,7 @@ const AFTER: Duration = Duration::from_secs(2);
 const EVERY: Duration = Duration::from_millis(200);
 /// Number of calls of [`Progress::at`] between two reads of the clock.
 const CALLS: u32 = 1000;
-/// Share of the work, 0 to 1, after which the time left is shown.
+/// Share of the work, 0 to 1, that must be done before the time left is shown.
 const TELLING: f64 = 0.01;
 
 /// Minimum interval between log messages on progress.
@@ -130,8 +130,8 @@ impl<W: Write> Write for Writing<W> {
     }
 }
 
-/// Seconds left if this share of the work is done; `None` if it is too early for an estimate, or if the work is
-/// finished.
+/// Estimated seconds left if `share` of the work took `elapsed_s`; `None` if it is too early for an estimate, or if the
+/// work is finished.
 fn left_s(elapsed_s: f64, share: f64) -> Option<f64> {
     (TELLING..1.0).contains(&share).then(|| elapsed_s * (1.0 - share) / share)
 }

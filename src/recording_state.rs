@@ -2,7 +2,8 @@
 
 use headrace_geometry::time::DurNs;
 
-/// Age of the latest sync to disk from which screens show the age. From `ALARM_FROM` on, it is an alarm.
+/// Age of the latest sync to disk from which screens show the age. From the age `ALARM_FROM` on, screens show it as an
+/// alarm.
 pub(crate) const SHOWN_FROM: DurNs = DurNs(2_000_000_000);
 pub(crate) const ALARM_FROM: DurNs = DurNs(5_000_000_000);
 

@@ -64,7 +64,7 @@ impl Recordings {
         RecordingState { fails, unsafe_s, rebuilt_pct: None }
     }
 
-    /// Dive time that a power cut would lose now, of the recording that is furthest behind.
+    /// Length of the dive that a power cut would lose now. If recordings differ, the largest of their lengths.
     pub(crate) fn unsafe_for(&self) -> DurNs {
         self.unsafe_for
     }
@@ -84,7 +84,7 @@ impl Recordings {
         self.all.iter().map(|one| one.handle.voice_port()).collect()
     }
 
-    /// Tells all recordings to end without an end mark, so that the dive can be continued.
+    /// Tells all recordings to end without an end mark. A log without an end mark can be continued.
     pub(crate) fn abandon(&mut self) {
         self.all.iter_mut().for_each(|one| one.handle.begin_to_abandon());
     }

@@ -19,7 +19,7 @@ use crate::progress::Writing;
 
 /// Runs `headrace recover`.
 pub(crate) fn recover(args: &Recover) -> Result<u8, Failure> {
-    // Errors of reading the log come before the output is created.
+    // The log is opened first, so that an error of reading it comes before the output is created.
     let files = files_of(&args.logs)?;
     DiveLog::open(&files)?;
     Claims::reading(files.clone(), &args.overwrite).claim("-o", &args.output, Kind::Recovered)?;

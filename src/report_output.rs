@@ -36,7 +36,8 @@ pub(crate) fn utc_text(utc_s: f64) -> String {
     let seconds = headrace_geometry::math::floor_to_i64(utc_s);
     let (mut days, of_day) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
     let is_leap = |year: i64| year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
-    // 400 years of the Gregorian calendar have 146,097 days, so the loops stay short.
+    // 400 years of the Gregorian calendar have 146,097 days. Skipping whole periods of 400 years keeps the loops below
+    // short.
     let mut year = 1970 + 400 * days.div_euclid(146_097);
     days = days.rem_euclid(146_097);
     while days >= 365 + i64::from(is_leap(year)) {

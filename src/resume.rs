@@ -20,9 +20,10 @@ use crate::outputs::SIMULATED;
 
 /// Longest interruption after which a dive is continued without its path on the command line, seconds.
 const LONGEST_S: f64 = 12.0 * 3600.0;
-/// Longest interruption by UTC that is believed after a reboot, seconds. UTC that shows a longer one was probably set.
+/// Longest interruption that UTC may show after a reboot, seconds. If UTC shows a longer one, the clock was probably
+/// set.
 const LONGEST_BY_UTC_S: f64 = 30.0 * 86_400.0;
-/// Shortest interruption that is assumed if the clocks show none.
+/// Interruption that is assumed if the clocks show no interruption.
 const SHORTEST: DurNs = DurNs(1_000_000_000);
 
 /// An interrupted dive that is to be continued.
@@ -31,7 +32,7 @@ pub(crate) struct Resuming {
     pub(crate) recordings: Vec<Interrupted>,
     /// Time without data.
     pub(crate) gap: DurNs,
-    /// Clock of the dive.
+    /// Clock of the interrupted dive, which the continued dive keeps.
     clock: DiveClock,
     /// Paths at which the dive isn't recorded any more, because their folder is gone.
     gone: Vec<PathBuf>,
@@ -40,7 +41,8 @@ pub(crate) struct Resuming {
 impl Resuming {
     /// The dive that the arguments ask to continue. `None` for a new dive.
     ///
-    /// Errors: a dive did not end in order, and the arguments don't say what to do; or the dive can't be continued.
+    /// Errors: a dive did not end in order, and the arguments don't state whether to continue it; or the dive can't be
+    /// continued.
     pub(crate) fn of(
         args: &Run,
         logs: &[PathBuf],
@@ -84,7 +86,7 @@ impl Resuming {
         mut recordings: Vec<Unfinished>,
         (vehicle, text): (&VehicleConfig, &str),
     ) -> Result<Self, Failure> {
-        // The report and the rebuilt state are those of the first recording.
+        // The report and the rebuilt state come from the first recording, so the one with the latest data is put first.
         recordings.sort_by_key(|recording| Reverse(recording.last));
         let Some(longest) = recordings.first() else {
             return Err(Failure::Usage(
@@ -170,7 +172,7 @@ impl Resuming {
         Ok(Rebuild::start(silent(vehicle)?, files, state)?)
     }
 
-    /// Paths that name the recordings.
+    /// Paths that name the recordings, as after `--record`.
     pub(crate) fn paths(&self) -> Vec<PathBuf> {
         self.recordings.iter().map(|interrupted| interrupted.recording.recording.clone()).collect()
     }
@@ -199,7 +201,7 @@ fn named_recording(args: &Run, named: &Path) -> Result<Unfinished, Failure> {
     })
 }
 
-/// The error if the files at a path, which can't be continued, belong to the dive that is to be continued.
+/// Error if the files at a path can't be continued, although they belong to the dive that is to be continued.
 fn not_replaced(log: &Path) -> Failure {
     let log = log.display();
     Failure::Usage(format!(
@@ -228,7 +230,7 @@ fn unfinished(log: &Path) -> Result<Option<PathBuf>, Failure> {
         return Ok(Some(log.to_owned()));
     }
     let last = Unfinished::last_in(folder, &is_no_live_dive)?;
-    // A service that starts anew doesn't continue a dive of another day.
+    // A service that is started again must not continue a dive of another day.
     Ok(last.filter(|recording| interruption_s(recording).is_none_or(|seconds| seconds < LONGEST_S)))
 }
 
@@ -262,7 +264,7 @@ fn is_same_vehicle(recorded: &LogInfo, vehicle: &VehicleConfig, text: &str) -> b
         && vehicle.attachments.iter().all(attached)
 }
 
-/// The clock of a dive. It starts in the first part with a packet of a sensor, and later parts aren't opened.
+/// The clock of a dive. The clock starts in the first part that has a packet of a sensor, so later parts aren't opened.
 fn clock_of_first(files: &[PathBuf]) -> DiveClock {
     let clock = |file: &PathBuf| clock_of(std::slice::from_ref(file)).ok();
     files.iter().filter_map(clock).find(|clock| clock.zero().is_some()).unwrap_or_default()
@@ -282,7 +284,7 @@ fn set_clock(dive: &Unfinished) -> DurNs {
     let gap = if is_same_boot {
         DurNs(host.0.cast_signed() + ahead - dive.last.0.cast_signed())
     } else {
-        // The gap is at least the time since the reboot, even if UTC was set back meanwhile.
+        // The time without data is at least the time since the reboot, even if UTC was set back meanwhile.
         by_utc.filter(is_plausible).map_or(since_boot, |gap| DurNs(gap.0.max(since_boot.0)))
     };
     let gap = DurNs(gap.0.max(SHORTEST.0));

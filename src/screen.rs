@@ -40,7 +40,7 @@ impl Screen {
         Some(if columns == 0 { COLUMNS } else { columns.max(LEAST_COLUMNS) } - 1)
     }
 
-    /// A printable line in the colour of a lamp.
+    /// A printable line in the colour of a status lamp.
     pub(crate) fn coloured(self, text: &str, lamp: Option<Lamp>) -> String {
         let text = one_line(text);
         let code = match lamp.filter(|_| self.colours) {

@@ -1,4 +1,4 @@
-//! Lines about the sensors' ports: at most one for each state of a device until the device runs again.
+//! Lines about the sensors' ports: until a device runs again, each of its states is shown at most once.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use headrace_ports::{Phase, Status};
 pub(crate) struct SensorLines(BTreeMap<usize, BTreeSet<String>>);
 
 impl SensorLines {
-    /// Records a status. Returns whether it has not been shown since the device last ran.
+    /// Records a status. Returns whether the status is new, which means not shown since the device last ran.
     ///
     /// A silent device has one status, whatever the text. Other statuses that differ only in numbers, such as a count
     /// of messages, are the same.

@@ -1,4 +1,4 @@
-//! A dive as a service of systemd: tells when it has begun, its status, its progress and its end.
+//! A dive as a service of systemd: tells systemd when the dive has begun, and its status, progress and end.
 //!
 //! Source: `sd_notify(3)`. The watchdog is fed by the loop's ticks, so systemd restarts a program whose loop hangs, even
 //! if its other threads go on.
@@ -19,9 +19,10 @@ use crate::watch::state_line;
 const SOCKET: &str = "NOTIFY_SOCKET";
 /// Longest interval between messages to systemd.
 const LONGEST: DurNs = DurNs(1_000_000_000);
-/// Number of messages within one interval of the watchdog, so that single late ones do no harm.
+/// Number of messages within one interval of the watchdog, so that a single late message does no harm.
 const PER_WATCHDOG: i64 = 4;
-/// Maximum number of messages in the queue. Old ones would feed the watchdog although the loop hangs.
+/// Maximum number of messages in the queue. Old messages in a longer queue would feed the watchdog although the loop
+/// hangs.
 const WAITING: usize = 2;
 
 /// Message to systemd.
@@ -84,7 +85,7 @@ impl Service {
 }
 
 impl Follower for Service {
-    /// The first tick comes after the recorders and the ports' threads have started.
+    /// Reports progress to systemd. The first tick comes after the recorders and the ports' threads have started.
     fn tick(&mut self, dive: &Loop) {
         self.progress(headrace_ports::now(), |recorded| state_line(dive, recorded).text());
     }
@@ -148,7 +149,8 @@ mod tests {
 
     use super::*;
 
-    /// Variable that makes the test below the service; its value is the number of ticks that the loop makes.
+    /// Environment variable that makes the test below act as the service. Its value is the number of ticks that the
+    /// loop makes.
     const TICKS: &str = "HEADRACE_TEST_TICKS";
     /// Interval between the ticks of a loop.
     const TICK: DurNs = DurNs(20_000_000);
@@ -163,7 +165,8 @@ mod tests {
             let now = MonoNs(1) + DurNs(TICK.0 * tick as i64);
             service.progress(now, |recorded| format!("tick {tick}, fails {:?}", recorded.fails));
             service.recorded(&RecordingState { fails: Some(false), ..RecordingState::default() });
-            // The loop is fast here: a full queue would lose messages.
+            // The ticks of the test follow each other quickly, and a full queue would lose messages. The pause prevents
+            // this.
             thread::sleep(Duration::from_millis(2));
         }
         service.ending();

@@ -77,7 +77,7 @@ pub(crate) fn simulate(args: &Simulate) -> Result<u8, Failure> {
             truth.write(&scene, &simulation.take_truth())?;
         }
     }
-    // If the simulated pilot follows advice, the duration of the dive is known only now.
+    // If the simulated pilot follows advice, the duration of the dive is known only after the simulation.
     let duration_s = simulation.duration_s();
     let (file, written) = writer.finish().map_err(Failure::writing(output))?;
     file.complete().map_err(failed)?;

@@ -19,7 +19,7 @@ const SILENT_S: f64 = 5.0;
 /// Maximum number of notes that the summary lists.
 const MOST_NOTES: usize = 20;
 
-/// Summary of a report as text. Its lines have at most `columns` columns, if given.
+/// Summary of a report as text. Lines are broken to at most `columns` columns, if given.
 pub(crate) fn summary(report: &Report, columns: Option<usize>) -> String {
     let mut text = String::new();
     let mut line = |words: String| {
@@ -191,7 +191,8 @@ fn metres(judged: &OtherTargetReport) -> String {
     metres_text(&Metres { pass_m, fail_m, cannot_say_m, open_m, not_inspected_m })
 }
 
-/// Lines about the missed and the unsure stretches, in the order of chainage: place, problem and action.
+/// Lines about the missed and the unsure stretches, in the order of chainage. Each line gives place, problem and
+/// action.
 fn stretches(report: &Report) -> Vec<String> {
     let fails = |run: &&RunReport| {
         let mut within =
@@ -329,8 +330,8 @@ fn smoothing(report: &SmoothingReport) -> Vec<String> {
     lines
 }
 
-/// Whether a section's change of verdict continues the series of changes that ends at `end_m`. If so, `end_m` is moved
-/// to the new end.
+/// Whether a section's change of verdict continues a series of equal changes that ends at chainage `end_m`, m. If so,
+/// `end_m` becomes the end of this section.
 fn follows(first: &ChangeReport, next: &ChangeReport, end_m: &mut f64) -> bool {
     let verdicts = |change: &ChangeReport| [change.before, change.after].map(verdict_text);
     let goes_on = (next.start_m - *end_m).abs() < 1e-6 && verdicts(first) == verdicts(next);

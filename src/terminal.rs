@@ -1,4 +1,4 @@
-//! Capabilities of the terminal behind an output. No other module reads `NO_COLOR`, `TERM` and the locale.
+//! Capabilities of the terminal behind an output. Only this module reads `NO_COLOR`, `TERM` and the locale.
 
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +24,7 @@ pub(crate) fn of(stream: &impl IsTerminal) -> Terminal {
     able(stream.is_terminal(), variable("NO_COLOR").as_deref(), variable("TERM").as_deref())
 }
 
-/// Whether `NO_COLOR` and `TERM` allow colours. Whether there is a terminal is not checked.
+/// Whether `NO_COLOR` and `TERM` allow colours. The function doesn't check whether there is a terminal.
 pub(crate) fn allows_colour() -> bool {
     let variable = |name: &str| std::env::var(name).ok();
     able(true, variable("NO_COLOR").as_deref(), variable("TERM").as_deref()).colour
@@ -71,8 +71,8 @@ pub(crate) fn is_verbose() -> bool {
     VERBOSE.load(Ordering::Relaxed)
 }
 
-/// Whether the terminal's last line is transient, such as progress or the dive's state. It has no line end,
-/// and a log message of any thread clears it first.
+/// Whether the terminal's last line is transient, such as progress or the dive's state. A transient line has no line
+/// end, and a log message of any thread first clears it.
 static TRANSIENT: AtomicBool = AtomicBool::new(false);
 
 /// Sets the flag that the last line is transient.

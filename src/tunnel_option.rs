@@ -30,7 +30,7 @@ pub(crate) fn table(text: &str) -> String {
     std::iter::once(begin).chain(parts.map(part)).collect()
 }
 
-/// A line of a vehicle file. A value that is no number, true or false is a text.
+/// A line of a vehicle file. A value is written as a text unless it is a number, true or false.
 pub(crate) fn line(key: &str, value: &str) -> String {
     let value = value.trim();
     let is_bare =

@@ -68,7 +68,7 @@ pub(crate) fn attached(
         let which = damage.unwrap_or_else(|| " is attached to this log".to_owned());
         Failure::Usage(format!("reading {}: no vehicle file{which}; give one with --vehicle", log.display()))
     })?;
-    // The path in messages is built as if the log were a folder with the attached file.
+    // Messages name the attached file as if it were in a folder that has the log's name.
     let vehicle =
         parse(&format!("{}/{VEHICLE_FILE}", log.display()), &text, &files::attached(&info.attachments))?;
     Ok((text, vehicle))

@@ -126,7 +126,7 @@ fn text(difference: &Difference, sources: &[SourceInfo]) -> String {
     }
 }
 
-/// A result's value as text. For a float, the text includes its bits.
+/// A result's value as text. The text of a float also has the float's bits.
 fn value(word: WordKind, bits: u64) -> String {
     match word {
         WordKind::Integer => format!("{bits}"),

@@ -24,7 +24,7 @@ use crate::terminal;
 const LINE_EVERY: DurNs = DurNs(10_000_000_000);
 /// Interval between state lines that are overwritten, and between states in JSON.
 const REFRESH_EVERY: DurNs = DurNs(1_000_000_000);
-/// Minimum time from a state line to the next one if the lamp's colour changes. It applies if lines can't be
+/// Minimum time from a state line to the next one if the colour of the status lamp changes and lines can't be
 /// overwritten.
 const CHANGE_EVERY: DurNs = DurNs(2_000_000_000);
 
@@ -47,7 +47,7 @@ pub(crate) struct Watch {
     show: Show,
     screen: Screen,
     printer: Option<Printer>,
-    /// Generator of the live messages for lines and followers.
+    /// Makes live messages from the loop's results, for lines and followers.
     teller: LiveMessages,
     /// Time and condition of the last state shown.
     shown: Option<(MonoNs, Condition)>,
@@ -380,7 +380,7 @@ impl Watch {
     }
 }
 
-/// The dive's state as a line, with failing or unsynced recordings.
+/// The dive's state as a line, with a warning if recordings fail or aren't synced.
 pub(crate) fn state_line(dive: &Loop, recorded: &RecordingState) -> PilotLine {
     let name = |source: usize| dive.sources().get(source).map_or_else(String::new, |info| info.id.clone());
     let state = dive.view().live_state();

@@ -1,4 +1,4 @@
-//! Collects the readings of a part of a log, as the loop decodes them: the input data of the calibration.
+//! Collects the readings of a part of a log, as the loop decodes them. They are the input of the calibration.
 
 use headrace_fusion::filter::settings::Settings;
 use headrace_geometry::site::Site;
@@ -11,7 +11,7 @@ use headrace_replay::drive::{Coming, DriveError, Pace, PacketSource, drive};
 use headrace_replay::log::LogError;
 use headrace_sensor::device::SensorInfo;
 
-/// At most this length of a log is processed, because its readings are held in memory, s.
+/// Maximum length of the processed part of a log, s. It is limited because the readings are held in memory.
 const MOST_S: f64 = 1200.0;
 
 /// Time window of the readings, in seconds from the log's first message.
@@ -84,7 +84,7 @@ impl Collected {
     }
 }
 
-/// A packet source that ends at the time `end`.
+/// A packet source that ends at the time `end`, even if the inner source has more packets.
 struct Until<'a> {
     feed: &'a mut dyn PacketSource,
     end: MonoNs,
@@ -145,7 +145,7 @@ pub(crate) struct Material<'a> {
     pub(crate) profile: &'a Profile,
     /// Water and location, from the vehicle file.
     pub(crate) site: Site,
-    /// Measurement noise of the sensors.
+    /// Measurement noise of the sensors, as the navigation filter assumes it.
     pub(crate) settings: Settings,
     /// Sensors of the vehicle file. The index is the number of the packet source.
     pub(crate) sensors: &'a [SensorInfo],

@@ -1,4 +1,4 @@
-//! Estimates, and the reasons for missing ones.
+//! Estimated values, and the reasons why some values can't be estimated.
 
 /// An estimated value, in the unit of its quantity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,7 +38,7 @@ pub(crate) enum NotEstimated {
         what: &'static str,
         /// Largest minus smallest value of the quantity.
         span: f64,
-        /// Unit of the variation and of its limit.
+        /// Unit of `span` and `limit`.
         unit: &'static str,
         /// Largest variation of the quantity at which the vehicle counts as stationary.
         limit: f64,
@@ -53,7 +53,7 @@ pub(crate) enum NotEstimated {
     PartOfTurn {
         /// Angle by which the head has turned, degrees.
         swept_deg: f64,
-        /// Time that the rest of the turn takes, whole seconds.
+        /// Time that the head still needs for the rest of the turn, whole seconds.
         missing_s: f64,
     },
     /// A head sweeps a sector to and fro, or doesn't turn.
@@ -74,7 +74,7 @@ pub(crate) enum NotEstimated {
         /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite
         /// direction, degrees.
         opposite_deg: f64,
-        /// Smallest total angle, seen together with the opposite direction, that is enough, degrees.
+        /// Smallest value of `opposite_deg` that is enough for a calibration, degrees.
         least_deg: f64,
     },
     /// The cross-section looks the same at every angle of the head about its axis.
@@ -155,7 +155,7 @@ pub(crate) enum NotEstimated {
     /// The times between which the vehicle was at the surface are unknown.
     #[error("the time at the surface is unknown; give --at-surface FROM..TO")]
     NoSurface,
-    /// The likelihood doesn't depend on a shift of the source's timestamps.
+    /// The likelihood of the measurements hardly changes if the source's timestamps are shifted.
     #[error(
         "the vehicle hardly turned or moved: the latency would have a standard deviation of {sd_ms:.0} ms"
     )]

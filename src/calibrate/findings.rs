@@ -70,7 +70,7 @@ impl Findings {
             };
             Ok(zeros.into_iter().map(|zero| (zero, filed_m(&zero))).collect())
         });
-        // The mounts found for the heads are used for estimating the time offsets.
+        // The time offsets are estimated with the mounts that were found for the heads.
         let sensors = sitting(&collected.sensors, heads.as_ref().ok());
         let sitting = Material { sensors: &sensors, ..in_time };
         let latencies: Vec<_> = vehicle.sensor_configs.iter().map(|sensor| sensor.latency).collect();

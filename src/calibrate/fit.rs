@@ -1,8 +1,7 @@
 //! Robust least-squares fit of the vehicle's position and the heads' mounts to the design profile.
 //!
-//! The method is Gauss-Newton. Each round is a recursive fit: [`Factors`] start with the prior, then include one return
-//! after the other. If the returns don't determine an unknown, the unknown keeps the vehicle file's value and
-//! uncertainty.
+//! The method is Gauss-Newton. In each round, [`Factors`] start with the prior and then include one return after the
+//! other. If the returns don't determine an unknown, the unknown keeps the vehicle file's value and uncertainty.
 
 use crate::calibrate::estimate::median;
 use crate::calibrate::scan::{EchoScan, HeadScan, Return};
@@ -42,7 +41,7 @@ pub(crate) const ANGLE_SD_RAD: f64 = 10.0 * DEGREE;
 pub(crate) const OFFSET_SD_M: f64 = 0.05;
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 
-/// Minimum standard deviation assumed for returns, m. Walls are at least this rough.
+/// Minimum standard deviation assumed for returns, m. It stands for the roughness that every wall has.
 const LEAST_SCALE_M: f64 = 0.01;
 /// Residuals beyond `HUBER` robust standard deviations get less weight. Residuals beyond `TUKEY` robust
 /// standard deviations are rejected. Source: the usual constants of Huber and Tukey.
@@ -51,14 +50,14 @@ const TUKEY: f64 = 4.685;
 /// Number of rounds with Huber's weights before the rounds with Tukey's weights, which need a good start.
 const HUBER_ROUNDS: usize = 3;
 /// Upper limit of the cost that one piece of wall adds to the fit, in squared standard deviations. `MISSED_COST` is the
-/// cost of a piece that the beam grazes or misses.
+/// cost of a piece of wall that the beam grazes or misses.
 const MOST_COST: f64 = 9.0;
 const MISSED_COST: f64 = 4.5;
 /// Upper limit of the cost that an echosounder's range adds to the fit, in squared standard deviations.
 ///
 /// The limit is high, because echosounders are few and only they distinguish left from right.
 const MOST_ECHO_COST: f64 = 100.0;
-/// Largest change of a head's angle in one round of the fit, radians. Larger steps are shortened.
+/// Largest change of a head's angle in one round of the fit, radians. A larger change is shortened.
 const MOST_STEP_RAD: f64 = 0.2;
 
 /// Input of a fit of the vehicle's position and the heads' mounts.
@@ -98,7 +97,7 @@ pub(crate) struct Fit<const N: usize> {
 pub(crate) struct Residual<const N: usize> {
     /// Index of the head that received the return.
     pub(crate) head: usize,
-    /// Weight of the return within its piece of wall.
+    /// Weight of the return. The returns from one piece of wall share a total weight of one.
     pub(crate) share: f64,
     /// Derivatives of the expected range, and the measured minus the expected range, m; `None` if the beam
     /// grazes or misses the wall.
@@ -123,7 +122,7 @@ fn add<const N: usize>(x: &mut [f64; N], i: usize, value: f64) {
 /// A mount after its head is turned about the head's axis and moved. The head may also turn the opposite way.
 pub(crate) fn moved(mount: &Mount, [angle_rad, left_m, up_m]: [f64; 3], is_mirrored: bool) -> Mount {
     let turned: Rot<Body, Sensor> = mount.rotation * about_x(angle_rad);
-    // A head that faces the opposite way, such as aft, has its angles in the opposite sense.
+    // A head that faces the opposite way, such as aft, measures its angles in the opposite sense.
     let yaw = if is_mirrored { math::PI } else { 0.0 };
     Mount {
         position: mount.position + Vec3::new(0.0, left_m, up_m),
@@ -149,8 +148,8 @@ impl Problem<'_> {
     pub(crate) fn fit<const N: usize>(&self, start: [f64; N], rounds: usize) -> Fit<N> {
         let known = self.known::<N>();
         let mut prior = start;
-        // The prior of the position is centred on the start of the fit. All other priors are centred on the
-        // file's values.
+        // The prior of the vehicle's position is centred on the start of the fit. The priors of all other unknowns are
+        // centred on the vehicle file's values.
         prior.iter_mut().skip(2).for_each(|slot| *slot = 0.0);
         let mut x = start;
         let mut factors = Factors::independent(known.map(|sd| sd * sd));
@@ -187,7 +186,8 @@ impl Problem<'_> {
         Fit { x, factors, cost, scale_m }
     }
 
-    /// Applies a step. The step is shortened if it would turn a head too far or leave the tunnel.
+    /// Applies one step of the fit to the unknowns. The step is shortened if it would turn a head too far or leave the
+    /// tunnel.
     fn go<const N: usize>(&self, x: &mut [f64; N], step: &[f64; N]) {
         let turns = (0..self.heads.len()).map(|head| at(step, own(head, 0)).abs());
         let most_rad = turns.fold(0.0, f64::max);
@@ -237,7 +237,7 @@ impl Problem<'_> {
         let state = state(x, one.attitude);
         let (mut h, row) = self.common_row(x, &state, &beam, one.range_m, 1.0)?;
         let place = vec::<Tunnel>(&row.h, POSITION);
-        // A change of the angle rotates the beam about the head's axis and leaves the origin of the beam
+        // A change of the head's angle rotates the beam about the head's axis and leaves the origin of the beam
         // unchanged.
         let swing = vec::<Tunnel>(&row.h, ATTITUDE) + -(state.attitude * offset).cross(&place);
         let [axis, left, up] =

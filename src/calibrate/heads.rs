@@ -14,11 +14,11 @@ use headrace_sampling::head::MAX_HEADS;
 const LEAST_OPPOSITE_DEG: f64 = 120.0;
 /// Largest allowed median of the absolute range residuals, m. Above it, the wall doesn't match the profile.
 const MOST_MEDIAN_M: f64 = 0.15;
-/// An estimate is reported only if its standard deviation is at most this share of the standard deviation assumed for
-/// the file's value.
+/// Largest share of the vehicle file's standard deviation that an estimate may have. An estimate that is less certain
+/// isn't reported.
 const TOLD: f64 = 0.3;
-/// Minimum cost difference between the two senses of rotation for a decision, in squared standard deviations.
-/// Chance alone exceeds it once in 10,000 times.
+/// Minimum difference in cost between the two senses of rotation, in squared standard deviations. Below it, the sense
+/// isn't decided. Chance alone exceeds it once in 10,000 times.
 const CLEAR: f64 = 15.0;
 /// Number of starting angles in the search for a head's angle. `START_ROUNDS` is the number of rounds per start,
 /// `START_STRIDE` the stride of the returns, and `ROUNDS` the number of rounds of all other fits.
@@ -66,7 +66,7 @@ pub(crate) struct Heads {
     pub(crate) scale: Estimate,
     /// Median of the absolute range residuals, m.
     pub(crate) median_m: f64,
-    /// The heads' estimates, in the order of their packet sources.
+    /// Estimates for each head, in the order of the heads' packet sources.
     pub(crate) heads: Vec<Head>,
 }
 
@@ -101,9 +101,10 @@ pub(crate) fn heads(material: &Material<'_>) -> Result<Heads, NotEstimated> {
 
 /// Checks that a head has turned once, and seen opposite walls.
 ///
-/// After less than a turn, a fit may have a small standard deviation and still be wrong, because it counts the errors
-/// of neighbouring returns as independent. Errors that many returns share (footprint, wall, profile) then look like
-/// another position of the vehicle and another angle of the head. Returns from opposite walls show the difference.
+/// After less than a turn, a fit may have a small standard deviation and still be wrong, because the fit counts the
+/// errors of neighbouring returns as independent. Errors that many returns share (footprint, wall, profile) then look
+/// like another position of the vehicle and another angle of the head. Returns from opposite walls distinguish such
+/// errors from a real offset.
 fn check_evidence(head: &HeadScan) -> Result<(), NotEstimated> {
     let swept_deg = head.sweep.swept_rad().to_degrees();
     if !head.sweep.is_whole() {
@@ -125,11 +126,11 @@ fn hardest(refused: &[(&HeadScan, NotEstimated)]) -> Option<NotEstimated> {
         NotEstimated::PartOfTurn { missing_s, .. } => *missing_s,
         _ => 0.0,
     };
-    // `max_by` returns the last of several equal reasons. In the reversed list, that is the first reason.
+    // The list is reversed because `max_by` returns the last of several equal reasons, but the first one is wanted.
     refused.iter().rev().map(|(_, why)| *why).max_by(|a, b| missing_s(a).total_cmp(&missing_s(b)))
 }
 
-/// Result for a head that is not calibrated, for this reason.
+/// Result for a head that was not calibrated for the reason `why`.
 fn unseen(head: &HeadScan, why: NotEstimated) -> Head {
     Head {
         source: head.source,
@@ -195,7 +196,7 @@ fn solve<const N: usize>(material: &Material<'_>, scan: &Scan, still: Still) -> 
     Ok(Heads { still, place_m: [y, z], scale, median_m, heads })
 }
 
-/// Position of the vehicle, from the echosounders; without them, the centre of the cross-section.
+/// Position of the vehicle, from the echosounders. Without echosounders, it is the centre of the cross-section.
 fn first_place(material: &Material<'_>, scan: &Scan) -> [f64; 2] {
     let start = material.profile.reference();
     let echoes = scan.echoes.iter().map(|echo| Echo { mount: echo.mount, range_m: echo.range_m });
@@ -330,7 +331,7 @@ impl Senses {
     }
 }
 
-/// Estimate of a weighted sum of unknowns.
+/// Estimate of a sum of unknowns, in which each unknown has a weight.
 fn estimate<const N: usize>(fit: &Fit<N>, parts: &[(usize, f64)]) -> Estimate {
     let mut h = [0.0; N];
     let mut value = 0.0;

@@ -39,7 +39,7 @@ use crate::output::{deliver, show};
 use crate::progress::Progress;
 use crate::vehicle_file::Given;
 
-/// Estimates a vehicle file's values from a log.
+/// Runs `headrace calibrate`: estimates a vehicle file's values from a log.
 pub(crate) fn calibrate(args: &Calibrate) -> Result<u8, Failure> {
     let mut player = Player::open(&files_of(std::slice::from_ref(&args.log))?)?;
     let given = Given::read(args.vehicle.as_deref())?;

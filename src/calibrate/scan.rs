@@ -16,10 +16,10 @@ use headrace_sensor::reading::Reading;
 
 /// Angle of one piece of wall, radians.
 ///
-/// All returns from one piece share the same roughness, so together they count as one return.
+/// All returns from one piece of wall share its roughness, so together they count as one return.
 pub(super) const SAME_WALL_RAD: f64 = TAU / SECTORS as f64;
 const SECTORS: usize = 120;
-/// Maximum number of returns used per piece of wall. Further returns add no information.
+/// Maximum number of returns used per piece of wall. More returns from the same piece add no information.
 const MOST_OF_A_SECTOR: usize = 8;
 
 /// A return of a head.
@@ -42,7 +42,7 @@ pub(crate) struct HeadScan {
     pub(crate) source: usize,
     /// Mount of the head in the vehicle file.
     pub(crate) mount: Mount,
-    /// Motion of the head, from all pings.
+    /// Motion of the head about its axis, from all its pings.
     pub(crate) sweep: Sweep,
     /// Sonar returns of the head.
     pub(crate) returns: Vec<Return>,
@@ -77,8 +77,8 @@ impl HeadScan {
     /// Total angle of the directions in which the head has seen wall, and has also seen wall in the opposite direction,
     /// radians.
     ///
-    /// If only one side is seen, an error common to all ranges shifts the estimated position and turns the estimated
-    /// angle. With opposite walls these effects cancel.
+    /// If a head sees only one side, an error common to all ranges shifts its estimated position and turns its
+    /// estimated angle. If it sees opposite walls, these effects cancel.
     pub(crate) fn opposite_rad(&self) -> f64 {
         let seen = self.seen();
         let (first, second) = seen.split_at(SECTORS / 2);
@@ -97,7 +97,7 @@ impl HeadScan {
         seen
     }
 
-    /// Drops returns beyond the limit per piece of wall, and weights the remaining returns.
+    /// Drops the returns of a piece of wall that exceed the limit, and sets the weights of the remaining returns.
     fn thin(&mut self) {
         let mut counts = [0_usize; SECTORS];
         for one in &self.returns {
@@ -131,7 +131,7 @@ fn sector(angle_rad: f64) -> usize {
     usize::try_from(sector).unwrap_or(0).min(SECTORS - 1)
 }
 
-/// Gathers the ranges of a time at rest.
+/// Gathers the ranges that all sonars measured while the vehicle was at rest.
 ///
 /// Errors: there is no attitude, or no head detected the wall.
 pub(crate) fn gather(material: &Material<'_>, still: &Still) -> Result<Scan, NotEstimated> {

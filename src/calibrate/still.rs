@@ -16,7 +16,7 @@ use headrace_sensor::reading::{Level, Reading};
 /// Length of a time bin. A source's readings in a bin give one median, so noise and outliers don't count as
 /// motion.
 const BIN: DurNs = DurNs(1_000_000_000);
-/// Minimum length of a time at rest, in bins. `MOST` is the longest part of that time that is used: a longer part adds
+/// Minimum length of a time at rest, in bins. `MOST` is the maximum number of bins that are used, because more bins add
 /// no information.
 const LEAST: usize = 3;
 const MOST: usize = 120;
@@ -50,7 +50,7 @@ impl Sign {
     }
 }
 
-/// A part of a log in which the vehicle stood still and its heads detected the wall.
+/// A period of a log in which the vehicle stood still and its heads detected the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Still {
     /// Receive time at which the period begins.
@@ -59,16 +59,16 @@ pub(crate) struct Still {
     pub(crate) to: MonoNs,
 }
 
-/// Values of one source in each time bin.
+/// Kind of quantity that one source measures, and the source's values in each time bin.
 type Raw = (Sign, Vec<Vec<f64>>);
 
-/// Medians of one source's values in each time bin.
+/// One source's values, reduced to their median in each time bin.
 struct Channel {
     sign: Sign,
     by_bin: Vec<Option<f64>>,
 }
 
-/// Finds the longest period in which the vehicle stood still; of equally long ones, the first.
+/// Finds the longest period in which the vehicle stood still; of several periods of equal length, the first.
 ///
 /// Errors: there is no attitude or no return, or the vehicle moved all the time.
 pub(crate) fn longest(material: &Material<'_>) -> Result<Still, NotEstimated> {
@@ -133,7 +133,7 @@ fn widened(span: Option<(f64, f64)>, value: f64) -> (f64, f64) {
     span.map_or((value, value), |(least, most)| (least.min(value), most.max(value)))
 }
 
-/// Error with the quantity that moved most, relative to its limit.
+/// Error that names the quantity which exceeded its limit by the largest factor.
 fn moved(channels: &[Channel]) -> NotEstimated {
     let mut worst = (Sign::Attitude, 0.0);
     for channel in channels {
@@ -183,7 +183,7 @@ fn channels(material: &Material<'_>, first: MonoNs, bins: usize) -> Vec<Channel>
     raw.into_values().map(channel).collect()
 }
 
-/// Up to three numbers of a reading, whose changes show motion. Unused numbers are NaN.
+/// Up to three numbers of a reading that change if the vehicle moves. Unused numbers are NaN.
 fn shows(
     material: &Material<'_>,
     sensor: &SensorInfo,

@@ -3,8 +3,8 @@
 use headrace_geometry::math::{self, TAU};
 use headrace_geometry::time::MonoNs;
 
-/// A head counts as turning all the way round if at most this share of its steps goes against its sense of rotation.
-/// Pings out of order cause a few such steps. A head that sweeps a sector makes as many steps one way as the other.
+/// Largest share of a head's steps that may go against its sense of rotation if the head turns all the way round. Pings
+/// out of order cause a few such steps. A head that sweeps a sector makes as many steps one way as the other.
 const MOST_BACK: f64 = 0.1;
 
 /// Angle swept by a head, from the angles of its pings in order of time.
@@ -14,9 +14,9 @@ pub(crate) struct Sweep {
     ends: Option<[(MonoNs, f64); 2]>,
     /// Smallest and largest unwrapped angle, radians.
     span_rad: [f64; 2],
-    /// Sum of the steps to larger and to smaller angles, radians, both positive.
+    /// Sum of the head's steps to larger angles, and sum of its steps to smaller angles, radians, both positive.
     ways_rad: [f64; 2],
-    /// Number of steps.
+    /// Number of steps between pings.
     steps: u32,
 }
 
@@ -38,7 +38,7 @@ impl Sweep {
         self.steps += 1;
     }
 
-    /// Angle between the outermost pings, radians.
+    /// Difference between the smallest and the largest angle of a ping, radians.
     pub(crate) fn swept_rad(&self) -> f64 {
         let [least_rad, most_rad] = self.span_rad;
         most_rad - least_rad
@@ -46,7 +46,8 @@ impl Sweep {
 
     /// Whether the head has pinged in all directions.
     ///
-    /// A turn's last ping is one step before the angle of its first. Half a step more allows for rounded angles.
+    /// The last ping of a turn is one step before the angle of the first ping. Half a step is added because angles are
+    /// rounded.
     pub(crate) fn is_whole(&self) -> bool {
         self.swept_rad() + 1.5 * self.step_rad() >= TAU
     }
@@ -110,7 +111,7 @@ mod tests {
 
     #[test]
     fn time_to_complete_a_turn_is_computed_from_the_rate() {
-        // 75 pings take 7.4 s at 24 degrees/s. Of 360 degrees, 180 are missing.
+        // The 75 pings take 7.4 s at 24 degrees/s, so about half of the turn is missing.
         let missing_s = sweep(turn(75, -1.0)).missing_s().unwrap();
         assert!((missing_s - 7.5).abs() < 1e-6, "{missing_s}");
     }

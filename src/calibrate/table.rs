@@ -8,7 +8,7 @@ use crate::calibrate::findings::Findings;
 use crate::calibrate::heads::Head;
 use crate::calibrate::zero::Zero;
 
-/// Largest relative error of the ranges' scale at which the other estimates are valid.
+/// Largest relative excess of all ranges at which the estimates of mounts and zeros are still valid.
 ///
 /// The limit is three times the error of tabulated speeds of sound.
 const MOST_SCALE: f64 = 0.01;
@@ -70,7 +70,7 @@ pub(crate) struct Table {
 }
 
 impl Found {
-    /// Whether the estimate differs so much that the vehicle file should be changed.
+    /// Whether an estimate differs so much from the vehicle file that the file should be changed.
     pub(crate) fn differs(&self) -> bool {
         match self.value {
             Value::Number { file, found } => found.differs_from(file),
@@ -96,7 +96,7 @@ impl Table {
 
     /// If ranges don't fit the profile's size, lists the speed of sound and removes all other lines.
     ///
-    /// The other values were then fitted to the wrong wall, so the file must keep its own values.
+    /// All other estimates were then fitted to a wall of the wrong size, so the file must keep its values.
     fn scale(&mut self, vehicle: &VehicleConfig, findings: &Findings) {
         let Ok(heads) = &findings.heads else { return };
         let Estimate { value, sd } = heads.scale;
@@ -122,8 +122,8 @@ impl Table {
         self.open.push(Open { of: of.to_owned(), what, why });
     }
 
-    /// Adds a row with an estimated number, or the reason why there is none. Returns whether the file should
-    /// be changed.
+    /// Adds a row with an estimated number, or the reason why there is none. Returns whether the vehicle file should be
+    /// changed.
     fn number(
         &mut self,
         of: &str,
@@ -203,7 +203,7 @@ impl Table {
         let left = self.number(&id, ("left", "m", 3), at.y(), head.left_m.map(from(at.y())));
         let up = self.number(&id, ("up", "m", 3), at.z(), head.up_m.map(from(at.z())));
         if left || up {
-            // A coordinate that doesn't differ stays as written in the file.
+            // A coordinate that doesn't differ from the estimate stays as written in the file.
             let y_m = if left { head.found.position.y() } else { at.y() };
             let z_m = if up { head.found.position.z() } else { at.z() };
             self.line(&sensor(&id), format!("position_m = {}", triple([at.x(), y_m, z_m], 3)));
@@ -219,8 +219,8 @@ impl Table {
             let id = id(vehicle, zero.source);
             let found = zero.found;
             self.number(&id, ("chainage at zero", "m", 3), *file_m, Ok(found));
-            // The line is always listed: a surveyed position is better than the file's value, even with the uncertainty
-            // that the cable's slack leaves.
+            // The line is listed even if the file's value agrees with the estimate. A surveyed position is better than
+            // the file's value, even with the uncertainty that the cable's slack leaves.
             self.line(&sensor(&id), format!("zero_at_m = {}", number(found.value, 3)));
         }
     }
@@ -236,7 +236,7 @@ impl Table {
             let file_ms = latency.map_or(0.0, |latency| latency.as_secs_f64() * 1e3);
             let found = lag.offset_s.map(|of| Estimate { value: file_ms + of.value * 1e3, sd: of.sd * 1e3 });
             self.number(&id, ("latency", "ms", 1), file_ms, found);
-            // Only a positive latency can be set in the file.
+            // A vehicle file can only have a positive latency.
             if let Ok(found) = found
                 && found.value > 0.0
                 && found.differs_from(file_ms)

@@ -1,7 +1,7 @@
 //! Estimates the latency of each source from the likelihood of the whole log.
 //!
-//! The filter runs with one source's timestamps shifted. The best shift makes all innovations together most
-//! likely.
+//! The filter runs with one source's timestamps shifted. The best shift is the one at which all innovations together
+//! are most likely.
 
 use crate::calibrate::collect::Material;
 use crate::calibrate::estimate::{Estimate, NotEstimated};
@@ -24,11 +24,13 @@ const FINE_S: core::ops::RangeInclusive<f64> = 0.01..=0.05;
 const CLEAR: f64 = 25.0;
 /// Largest standard deviation at which a time offset is reported, s.
 const TOLD_S: f64 = 0.03;
-/// Amount by which a latency may seem negative before the latency counts as inconsistent, s.
+/// Amount by which a source may seem early, as if its latency were negative, before its latency counts as inconsistent,
+/// s.
 const EARLY_S: f64 = 0.01;
 /// Largest share of measurements rejected at the gate at which the filter still follows the vehicle.
 const MOST_GATED: f64 = 0.2;
-/// Minimum number of readings of a source. `MOST` is the longest part of a log that is used: its beginning is enough.
+/// Minimum number of readings of a source. `MOST` is the length of the part of a log that is used, from the log's
+/// beginning.
 const LEAST_READINGS: usize = 50;
 const MOST: DurNs = DurNs(600_000_000_000);
 
@@ -46,8 +48,8 @@ pub(crate) struct Lag {
 /// `latencies` are those of the vehicle file, by source. The events' times of validity already include them.
 /// `progress` is called before each run of the filter.
 ///
-/// Sources that are clearly late are corrected first, beginning with the clearest one: as long as one source
-/// is late, the others seem early. No source can be early by more than its latency.
+/// Sources that are clearly late are corrected first, beginning with the clearest one, because the other sources seem
+/// early as long as one source is late. No source can be early by more than its latency.
 ///
 /// Errors: the filter never gave a fix.
 pub(crate) fn lags(
@@ -119,7 +121,7 @@ fn own_up(lags: &mut [Lag], latencies: &[DurNs]) {
 /// A parabola fitted to the likelihood as a function of a source's shift, relative to its current shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Curve {
-    /// Most likely shift, s.
+    /// Shift of the source's timestamps that is most likely, s.
     best_s: f64,
     /// Standard deviation of the most likely shift, s.
     sd_s: f64,
@@ -203,7 +205,7 @@ impl<'a, 'b> Runs<'a, 'b> {
     fn surprise(&mut self) -> Option<f64> {
         (self.progress)();
         let Material { profile, site, mut settings, sensors, .. } = *self.material;
-        // A reading shifted back in time must still fit into the filter's window.
+        // A reading shifted back in time must still fit into the filter's window of past times.
         settings.learns = false;
         settings.window = settings.window + DurNs::from_secs_f64(REACH_S + COARSE_S);
         let mut filter = FilterNavigation::new(profile.clone(), site, settings);

@@ -130,7 +130,7 @@ pub(crate) fn tethers(
         return Err(NotEstimated::Missing { what: "a cable counter" });
     }
     let settings = &material.settings;
-    // At rest the cable's slack is constant, so its error doesn't average out.
+    // While the vehicle is at rest, the cable's slack is constant, so the error that it causes doesn't average out.
     let sd_m = math::hypot(settings.tether_sd_m, settings.slack.reach);
     let zero = |(source, quantum_m, mut lengths): (usize, f64, Vec<f64>)| Zero {
         source,

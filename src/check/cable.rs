@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 /// Accuracy of the cable's chainage, for a vehicle with a counter and the filter.
 pub(super) struct Cable {
-    /// Step of the counter, m; `None` if each reading states its own step.
+    /// Step of the counter, m; `None` if each reading states the step itself.
     step_m: Option<f64>,
     /// Standard deviation of the slack, m, and its time constant, s.
     slack: [f64; 2],
@@ -35,7 +35,8 @@ impl Cable {
         let step_m = vehicle.counter?.step_m;
         let planned_mps = Some(vehicle.planned_speed_mps).filter(|planned| *planned > 0.0);
         let at_speed = errors.zip(planned_mps.or(v_max_mps)).map(|(errors, speed_mps)| {
-            // The argument is the time between the passes on either side of a hole of the target's size.
+            // `pass_error_m` takes the time between the two passes on either side of a hole that is as large as the
+            // target.
             let sd_m = errors.pass_error_m(vehicle.target.max_hole_m / speed_mps);
             [speed_mps, sd_m, (vehicle.target.max_hole_m - vehicle.target.error_m(sd_m)).max(0.0)]
         });

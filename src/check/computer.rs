@@ -16,7 +16,7 @@ static PIECE: [u8; 64 << 10] = [0; 64 << 10];
 /// Interval between syncs, as in a recording (docs/reference/recorder.md).
 const EVERY: Duration = Duration::from_millis(500);
 
-/// Test of the disk on which a folder is: a file that a thread writes and syncs as a recorder does.
+/// Test of the disk on which a folder is: a thread writes and syncs a file, as a recorder does.
 pub(super) struct DiskTest {
     stop: Sender<()>,
     thread: JoinHandle<Disk>,
@@ -95,14 +95,14 @@ impl CpuTimes {
     pub(super) fn read() -> Option<Self> {
         let text = std::fs::read_to_string("/proc/stat").ok()?;
         let all = text.lines().next()?.strip_prefix("cpu ")?;
-        // The times after the eighth are contained in the first two.
+        // Only eight times are added, because the first two already contain the times that follow.
         let times: Vec<u64> = all.split_whitespace().take(8).filter_map(|time| time.parse().ok()).collect();
         let [_, _, _, idle, waiting, ..] = times[..] else { return None };
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         Some(Self { idle: idle + waiting, all: times.iter().sum(), cores })
     }
 
-    /// Number of spare cores since `before`, and number of cores.
+    /// Mean number of cores that have been idle since `before`, and number of all cores.
     pub(super) fn spare_since(&self, before: &Self) -> (f64, usize) {
         let all = self.all.saturating_sub(before.all).max(1);
         let idle = self.idle.saturating_sub(before.idle);

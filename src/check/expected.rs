@@ -38,7 +38,7 @@ pub(super) fn rate_hz(device: &dyn Device, head: Option<HeadProgram>, site: Site
     count as f64 / COUNTED.as_secs_f64()
 }
 
-/// Number of measurements that a device begins while it is emulated.
+/// Number of measurements that a device begins during the time for which it is emulated.
 fn begun<M>(mut device: Box<dyn Emulator<M>>, start: MonoNs) -> usize {
     let mut due = Vec::new();
     device.begin(start + COUNTED, &mut due);
@@ -58,7 +58,7 @@ pub(super) fn noise(
         NavigationConfig::Filter(settings) => *settings,
         NavigationConfig::Direct => Settings::default(),
     };
-    // A sample of white noise has the standard deviation: density times the root of the rate.
+    // The standard deviation of a sample of white noise is the noise density times the square root of the rate.
     let root = math::sqrt(rate_hz);
     let (key, sd) = match (quantity, sense) {
         (Quantity::Range, Sense::Head) => ("return_sd_m", settings.return_sd_m),

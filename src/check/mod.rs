@@ -58,8 +58,8 @@ pub(crate) fn file(path: &Path) -> Result<u8, Failure> {
     })
 }
 
-/// Mode in which the vehicle's heads meet the target at the largest speed, and this speed less a margin, m/s. `text` is
-/// the text of the vehicle file.
+/// Mode in which the vehicle's heads meet the target at the largest speed, and this speed reduced by a margin, m/s.
+/// `text` is the text of the vehicle file.
 pub(crate) fn best_mode(vehicle: VehicleConfig, text: &str) -> Option<(&'static str, f64)> {
     Readable::new(vehicle, ("vehicle.toml", text), &mut Vec::new()).outlook?.best_mode()
 }
@@ -186,7 +186,7 @@ impl Readable {
         vehicle_file::log(name, &vehicle);
         let mut findings = vehicle.findings();
         findings.extend(too_many(&vehicle));
-        // If the vehicle has errors, findings about its plan would only repeat these errors.
+        // If the vehicle has errors, the problems of its plan would only repeat these errors.
         if findings.iter().all(|finding| finding.grade != Grade::Error) {
             findings.extend(outlook.iter().flat_map(|outlook| outlook.findings(&vehicle)));
         }
@@ -236,7 +236,7 @@ fn too_many(vehicle: &VehicleConfig) -> Option<Finding> {
     })
 }
 
-/// Locates a finding: its line in the file, and the present value of its key.
+/// Adds to a finding the line that it concerns in the file, and the present value of its key.
 fn placed(finding: Finding, name: &str, text: &str) -> Found {
     let Finding { grade, key, problem } = finding;
     let line = Document::new(name, text).line_of(&key);

@@ -10,9 +10,9 @@ use serde_json::{Value, json};
 
 /// Plan for the vehicle as its file describes it. The vehicle is assumed to be on the tunnel's axis.
 pub(super) struct Outlook {
-    /// The planner's answer for the mode that all heads have; `None` if their modes differ.
+    /// Planner's answer for the mode to which all heads are set; `None` if their modes differ.
     own: Option<Answer>,
-    /// The planner's answer for the mode with the largest speed.
+    /// Planner's answer for the mode with the largest speed.
     best: Option<Answer>,
     /// Largest speed, m/s, if the heads' start angles are those for the planned speed.
     ///
@@ -47,7 +47,7 @@ impl Outlook {
         let (mut heads, mut ids) = (Vec::new(), Vec::new());
         for (sensor, config) in sensors {
             let Some(spec) = sensor.head() else { continue };
-            // Each head offers all of its modes, at its configured range setting.
+            // Each head is planned with all of its modes, at its configured range setting.
             heads.push((spec, sensor.modes(None).unwrap_or_default()));
             ids.push(config.id.clone());
         }
@@ -210,7 +210,7 @@ impl Outlook {
     }
 }
 
-/// Arbitrary speed for results that don't depend on the speed, m/s.
+/// An arbitrary speed, m/s, for results that are the same at every speed.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 /// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.

@@ -8,11 +8,12 @@ use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::messages::Event;
 use headrace_sensor::reading::Reading;
 
-/// Returns of a head within this angle have the same direction. It is the smallest step of an 881, 0.3 degrees.
+/// Largest angle between two returns of a head that count as the same direction. It is the smallest step of an 881, 0.3
+/// degrees.
 const SAME_DIRECTION_RAD: f64 = 0.3 * core::f64::consts::PI / 180.0;
 /// Share of a Gaussian distribution within one standard deviation.
 const WITHIN_SD: f64 = 0.6827;
-/// Fewer differences give no noise.
+/// Minimum number of differences between values from which noise is computed.
 const LEAST_DIFFERENCES: usize = 20;
 
 /// A measured quantity.
@@ -28,7 +29,7 @@ pub(super) enum Quantity {
 }
 
 impl Quantity {
-    /// Name and unit.
+    /// Name and unit of the quantity.
     pub(super) fn name_and_unit(self) -> [&'static str; 2] {
         match self {
             Self::Range => ["range", "m"],
@@ -49,7 +50,7 @@ pub(super) struct Series {
     first: MonoNs,
     last: MonoNs,
     longest_gap: DurNs,
-    /// Latest value of each channel: axis of a vector, or direction of a head.
+    /// Latest value of each channel. A channel is an axis of a vector, or a direction of a head.
     latest: BTreeMap<i64, f64>,
     /// Absolute differences between successive values of a channel.
     differences: Vec<f64>,
@@ -72,10 +73,10 @@ impl Series {
         !self.latest.is_empty()
     }
 
-    /// Standard deviation of the noise; `None` without enough values.
+    /// Standard deviation of the noise; `None` if there are too few values.
     ///
-    /// It is computed from differences between successive values, so slow motion doesn't count. The quantile leaves
-    /// out outliers.
+    /// It is computed from differences between successive values, so slow motion doesn't count as noise. A quantile of
+    /// the differences is used, so outliers don't count either.
     pub(super) fn noise_sd(&self) -> Option<f64> {
         let mut sorted = self.differences.clone();
         sorted.sort_by(f64::total_cmp);
@@ -111,7 +112,7 @@ impl SensorReadings {
         }
     }
 
-    /// The quantity with the most readings. Its rate is that of the sensor.
+    /// The quantity with the most readings. The rate of its readings counts as the rate of the sensor.
     pub(super) fn main(&self) -> Option<&Series> {
         self.0.values().max_by_key(|series| series.count)
     }
@@ -135,7 +136,7 @@ fn values(reading: &Reading, site: Site) -> (Quantity, [Option<(i64, f64)>; 3]) 
         Reading::SpecificForce(force) => (Quantity::Acceleration, axes([force.x(), force.y(), force.z()])),
         Reading::VelocityOverGround(speed) => (Quantity::Velocity, axes([speed.x(), speed.y(), speed.z()])),
         Reading::TetherLength(length) => (Quantity::Cable, one(Some(length.length_m))),
-        // The unit filters its attitude, so successive values don't show noise.
+        // An inertial unit filters its attitude, so differences between successive values don't show the noise.
         Reading::Attitude(_) => (Quantity::Attitude, one(None)),
     }
 }

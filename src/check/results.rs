@@ -12,13 +12,14 @@ use crate::output::append;
 use crate::recording_state::SHOWN_FROM;
 use crate::report_output::utc_text;
 
-/// Fewest spare cores. A dive with four heads takes a small part of a core (ARCHITECTURE.md); the rest is a reserve for
-/// the page's viewers.
+/// Minimum number of spare cores. A dive with four heads takes a small part of a core (ARCHITECTURE.md), and the rest
+/// is a reserve for the page's viewers.
 const LEAST_SPARE: f64 = 0.5;
 const GIB: f64 = (1_u64 << 30) as f64;
 
 impl Results {
-    /// Faults, each with the name of the faulty part. Those of the computer come first, because they may cause others.
+    /// Faults, each with the name of the faulty part. Faults of the computer come first, because they may cause faults
+    /// of sensors.
     fn faults(&self) -> Vec<(&str, Fault)> {
         let mut faults = self.disk_faults();
         if let Some((spare, _)) = self.cpu.filter(|(spare, _)| *spare < LEAST_SPARE) {

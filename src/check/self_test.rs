@@ -26,11 +26,13 @@ use crate::live;
 use crate::progress::Progress;
 use crate::watch::Watch;
 
-/// A sensor is slow below this share of its expected rate. A busy computer delays some readings.
+/// Smallest share of its expected rate at which a sensor isn't reported as slow. It is below 1 because a busy computer
+/// delays some readings.
 const LEAST_RATE: f64 = 0.8;
-/// A sensor is noisy above this multiple of its expected noise. Data sheets state typical values.
+/// Largest multiple of its expected noise at which a sensor isn't reported as noisy. It is above 1 because data sheets
+/// state typical values.
 const MOST_NOISE: f64 = 3.0;
-/// Largest share of damaged frames. On a sound line, there are none.
+/// Largest allowed share of damaged frames. A sound line has no damaged frames.
 const MOST_DAMAGED: f64 = 0.01;
 
 /// Results of a self-test.
@@ -65,10 +67,10 @@ pub(super) struct Noise {
     pub(super) expected: ExpectedNoise,
 }
 
-/// A reason not to dive, and the action.
+/// A reason not to dive, and the action that removes it.
 #[derive(Clone)]
 pub(super) struct Fault {
-    /// The fault in one or two words.
+    /// Name of the fault, one or two words.
     pub(super) word: &'static str,
     pub(super) problem: String,
     pub(super) action: String,
@@ -99,7 +101,7 @@ impl Follower for ReadingsKeeper {
     fn end(&mut self, _: &Loop) {}
 }
 
-/// Runs the devices for `duration`, or until Ctrl-C. `folder` is that of the recording.
+/// Runs the devices for `duration`, or until Ctrl-C. `folder` is the folder in which dives are recorded.
 ///
 /// Errors: the devices can't be run, or no file can be created in the folder.
 pub(super) fn run(

@@ -41,7 +41,7 @@ pub(crate) struct PageArgs {
 }
 
 impl PageArgs {
-    /// Files that the page reads.
+    /// Files that the server of the page reads: tokens, certificate and key.
     pub(crate) fn files(&self) -> impl Iterator<Item = PathBuf> {
         [&self.page_token_file, &self.page_cert, &self.page_key].into_iter().flatten().cloned()
     }

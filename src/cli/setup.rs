@@ -47,7 +47,7 @@ pub(crate) struct GivenPort {
     /// Kind of device on the port; `None` if the port is to be probed.
     pub(crate) plugin: Option<&'static str>,
     pub(crate) connect: Connect,
-    /// Further keys of the sensor's table in the vehicle file.
+    /// Further keys of the sensor's table in the vehicle file, each with its value.
     pub(crate) keys: Vec<(String, String)>,
 }
 
@@ -58,7 +58,7 @@ impl GivenPort {
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut parts = text.split(',');
         let first = parts.next().unwrap_or_default();
-        // An = in the connection itself comes after its colon.
+        // An equals sign after the colon belongs to the connection, not to a plugin's name.
         let named = first.split_once('=').filter(|(plugin, _)| !plugin.contains(':'));
         let plugin = named.map(|(plugin, _)| plugin_named(plugin)).transpose()?;
         let connect =

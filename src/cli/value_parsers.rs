@@ -162,7 +162,7 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     within(text, "seconds", 0.0, 1.0e7)
 }
 
-/// Duration of a self-test. A clock's drift needs ten seconds.
+/// Duration of a self-test. The drift of a clock can only be measured over at least ten seconds.
 pub(super) fn test_seconds(text: &str) -> Result<f64, String> {
     within(text, "seconds", 10.0, 120.0)
 }

@@ -49,7 +49,8 @@ pub(super) enum Order {
     End,
 }
 
-/// Reads the controls on a separate thread, and shows their list. Dropping the returned `Keyboard` releases the keys.
+/// Reads keys or lines on a separate thread, and shows the list of them. Dropping the returned `Keyboard` releases the
+/// keys.
 ///
 /// Errors: the terminal's settings can't be changed.
 pub(super) fn listen() -> Result<(Receiver<Input>, Option<Keyboard>), Failure> {

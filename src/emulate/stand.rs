@@ -1,4 +1,4 @@
-//! An emulated device's port, with the faults of its line.
+//! Port of an emulated device, with faults that a real line may have.
 
 use std::collections::VecDeque;
 use std::io;
@@ -33,7 +33,7 @@ pub(super) struct Stand {
     held_until: MonoNs,
     /// Delayed messages, with the times at which they are due.
     late: VecDeque<(MonoNs, Vec<u8>)>,
-    /// Time at which a restarted device is on again.
+    /// Time at which a restarted device gets power again.
     on_at: Option<MonoNs>,
 }
 
@@ -183,8 +183,8 @@ impl Drop for Stand {
     }
 }
 
-/// A name by which `connect` can refer to a serial port; `None` if the folder's name has characters that `connect`
-/// can't have.
+/// Name by which `connect` can refer to a serial port; `None` if the folder's name has characters that `connect` can't
+/// have.
 fn lasting_name(folder: &Path, id: &str) -> Option<String> {
     let folder = folder.canonicalize().ok()?.join(PORTS);
     std::fs::create_dir_all(&folder).ok()?;

@@ -27,7 +27,7 @@ const USUAL_HEAD: &str = "imagenex881";
 /// Range setting of the heads that are assumed without a vehicle file, m. Source: the maker's table of modes.
 const USUAL_RANGE_M: f64 = 10.0;
 
-/// An inspection to be planned, with the names of its parts.
+/// An inspection to be planned, with the names of its tunnel, heads and layout.
 pub(super) struct Case {
     pub(super) inspection: Inspection,
     pub(super) heads: Vec<String>,
@@ -135,7 +135,7 @@ fn ideal_heads(args: &Plan) -> Result<Vec<(String, Head)>, Failure> {
             mount: Mount { position: Vec3::zero(), rotation: Rot::identity() },
             latency: DurNs::ZERO,
         };
-        // The plan covers all modes of the head, so the mode set here has no effect.
+        // The plan covers all modes of the head, so the mode that is set here has no effect.
         let own = Document::new("plan", "mode = \"slow\"").root()?;
         let device = kind.configure(&config, &own)?;
         let mut heads = heads_of(Path::new("plan"), &[device], Some(range_m))?;

@@ -65,7 +65,8 @@ fn find(case: Case, args: &Plan) -> Result<Findings, Failure> {
         let speed_mps = best.speed_mps?;
         Some((number, if asked { speed_mps } else { printed_mps(speed_mps) }))
     });
-    // Occlusion doesn't depend on the speed, and is reported even if no mode meets the target. So any speed will do.
+    // Occlusion doesn't depend on the speed, and is reported even if no mode meets the target. So an arbitrary speed is
+    // used.
     let (mode, speed_mps) = shown.unwrap_or((0, ANY_SPEED_MPS));
     let briefing = planner.briefing(mode, speed_mps)?;
     let footprints_m = planner.footprints_m()?;
@@ -99,7 +100,7 @@ fn is_met(answer: &Answer) -> bool {
         && answer.spacing.is_some_and(|spacing| spacing.t_max_m.is_some())
 }
 
-/// Arbitrary speed for results that don't depend on the speed, m/s.
+/// An arbitrary speed, m/s, for results that are the same at every speed.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 type Picture = fn(&Shown<'_>) -> Result<String, SamplingError>;

@@ -182,7 +182,7 @@ fn spacing_columns(spacing: &Spacing, speed_mps: f64) -> String {
 
 fn notes(findings: &Findings) -> Vec<String> {
     let mut notes = Vec::new();
-    // Several modes often miss the request for the same reason, which is printed once.
+    // Several modes often miss the request for the same reason, so each reason is printed once.
     let mut reasons: Vec<(&String, Vec<&str>)> = Vec::new();
     for answer in &findings.answers {
         let Some(why) = &answer.refused else { continue };
@@ -226,7 +226,7 @@ fn best_words(best: &Answer) -> String {
 
 /// Text about how much speed each safety margin costs.
 fn margin_words(mode: &str, margins: &Margins) -> String {
-    /// Cost of a margin, m/s, below which it isn't printed, because the rounded speeds would not show it.
+    /// Smallest cost of a margin that is printed, m/s. A smaller cost would not show in the rounded speeds.
     const NOTHING_MPS: f64 = 5e-4;
     let mut words = vec![format!("{mode}: {:.3} m/s from the geometry alone", margins.geometry_mps)];
     let after = margins.speeds_mps().into_iter().skip(1);
@@ -304,7 +304,7 @@ fn start_lines(findings: &Findings, briefing: &Briefing) -> Vec<String> {
             starts.join("; ")
         ));
     }
-    // Pairs of heads at equal distances have the same rule for equal start angles. Each rule is printed once.
+    // Pairs of heads at equal distances have the same rule for equal start angles, so each rule is printed once.
     let mut said = Vec::new();
     for rule in &briefing.hull_rules {
         let text = format!(

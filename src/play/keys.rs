@@ -12,7 +12,7 @@ use crate::output::aside;
 /// Length of a jump in time by the left or right arrow key. `FAR` is the length by the up or down arrow key.
 const STEP: DurNs = DurNs::from_millis(10_000);
 const FAR: DurNs = DurNs::from_millis(60_000);
-/// Slowest speed of playback, relative to real time. Beyond `FASTEST`, playback is unlimited.
+/// Slowest speed of playback, relative to real time. `FASTEST` is the fastest speed; the next faster one is unlimited.
 const SLOWEST: f64 = 0.125;
 const FASTEST: f64 = 1024.0;
 

@@ -49,7 +49,8 @@ pub(super) struct FoundDevice {
 
 impl FoundDevice {
     fn new(plugin: &'static str, connect: Connect, identity: String) -> Self {
-        // An identity contains keys of the vehicle file as "head_id = 0x10".
+        // In the text of an identity, a part with an equals sign is a key of the vehicle file, such as "head_id =
+        // 0x10".
         let is_key = |part: &&str| part.contains(" = ");
         let keys: Vec<&str> = identity.split(", ").filter(is_key).collect();
         let keys = keys.join("\n") + if keys.is_empty() { "" } else { "\n" };
@@ -61,7 +62,7 @@ impl FoundDevice {
         self.keys.lines().any(|line| line.split(" = ").next() == Some(key))
     }
 
-    /// The device, configured by its keys and `more` lines.
+    /// The device, configured by its own keys and by the lines `more`.
     ///
     /// Errors: a key is missing or has a wrong value.
     pub(super) fn configured(&self, more: &str) -> Result<Box<dyn Device>, String> {
@@ -174,7 +175,7 @@ fn given(port: &GivenPort) -> Result<FoundDevice, Failure> {
     Ok(device)
 }
 
-/// The device on a port, bus or interface of this computer. `None` if there is none, or none that is wanted.
+/// The device on a port, bus or interface of this computer. `None` if there is no device, or the user doesn't want it.
 fn attached(found: &Found, questions: &mut Questions) -> Result<Option<FoundDevice>, Failure> {
     let connect = found.connect.as_deref().map(|text| text.replace("ADDRESS", DEPTH_SENSOR));
     let Some(connect) = connect.and_then(|text| Connect::parse(&text).ok()) else { return Ok(None) };

@@ -20,7 +20,7 @@ use devices::FoundDevice;
 use questions::{Question, Questions};
 use vehicle_text::{Answers, is_head};
 
-/// Mode of the heads until the best one is known. Every head has it.
+/// Mode that every head gets until the best mode is known.
 const ANY_MODE: &str = "slow";
 /// Name of the file of udev rules, as in the package.
 const RULES_FILE: &str = "70-headrace.rules";

@@ -12,13 +12,13 @@ use crate::output::put;
 /// A question.
 pub(super) struct Question<'a> {
     pub(super) text: &'a str,
-    /// Option that gives the answer without a terminal.
+    /// Option that gives the answer if there is no terminal.
     pub(super) option: &'a str,
     /// Suggested answer; `None` if there can't be one.
     pub(super) suggestion: Option<&'a str>,
 }
 
-/// Asks questions, and collects those without an answer.
+/// Asks questions, and collects the questions that have no answer.
 pub(super) struct Questions {
     has_terminal: bool,
     takes_suggestions: bool,
@@ -26,7 +26,7 @@ pub(super) struct Questions {
 }
 
 impl Questions {
-    /// Creates the questions. With `takes_suggestions` those with a suggestion aren't asked.
+    /// Creates the questions. With `takes_suggestions`, questions that have a suggested answer aren't asked.
     pub(super) fn new(takes_suggestions: bool) -> Self {
         Self { has_terminal: keyboard::is_ours(), takes_suggestions, missing: Vec::new() }
     }

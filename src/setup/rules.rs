@@ -10,9 +10,9 @@ const RULES: &str = include_str!("../../deploy/udev/70-headrace.rules");
 /// Folders in which udev looks for rules. Source: `udev(7)`.
 const FOLDERS: [&str; 4] =
     ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"];
-/// Vendor id of FTDI, in the identities of its adapters.
+/// USB vendor id of FTDI, which makes serial adapters.
 const FTDI: u16 = 0x0403;
-/// Counter in the package's rules.
+/// Ids of the cable counter in the package's rules, which are replaced by those of the counter found.
 const PACKAGED_COUNTER: &str = "0003:1209:0001";
 
 /// Rules that these connections need and no file below `root` contains, one per line.
@@ -28,7 +28,7 @@ pub(super) fn missing<'a>(connections: impl Iterator<Item = &'a Connect>, root: 
     missing
 }
 
-/// Text by which a rule for this connection is recognised, and that text in the package's rules.
+/// Text by which a rule for this connection is recognised, and the text that the package's rules have in its place.
 fn marks(connect: &Connect) -> Option<(String, &'static str)> {
     let same = |mark: &'static str| Some((mark.to_owned(), mark));
     match connect {

@@ -14,7 +14,7 @@ use crate::tunnel_option;
 const RANGE_MARGIN: f64 = 1.5;
 /// Longest range setting that is tried, m.
 const LONGEST_RANGE_M: f64 = 100.0;
-/// Column of the comments.
+/// Column in which the comments of the vehicle file begin.
 const COMMENTS: usize = 34;
 
 /// Answers that the vehicle file needs besides the devices.

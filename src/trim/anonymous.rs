@@ -20,9 +20,9 @@ const UTC_FROM_NS: u64 = 946_684_800_000_000_000;
 /// Header without identifying data.
 pub(crate) struct Anonymous {
     vehicle_toml: String,
-    /// Old and new name of each attached file.
+    /// Name of each attached file in the old log, and its new name.
     names: Vec<(String, String)>,
-    /// Messages that list the items that couldn't be removed.
+    /// Texts that name the identifying items which couldn't be removed.
     pub(crate) left: Vec<String>,
 }
 
@@ -64,7 +64,7 @@ impl Anonymous {
     }
 }
 
-/// Messages that list the items that can't be removed.
+/// Texts that name the identifying items which can't be removed.
 fn left(log: &DiveLog, vehicle: &VehicleConfig) -> Vec<String> {
     let info = log.header();
     let ids = |sources: &[SourceInfo]| {
@@ -91,8 +91,8 @@ fn ending(name: &str) -> &str {
     name.rfind('.').and_then(|dot| name.get(dot..)).unwrap_or_default()
 }
 
-/// A value of `connect` with the same carrier, but without identifying parts. `number` makes the results
-/// distinct.
+/// Anonymised value of a sensor's `connect`. The kind of connection (serial, TCP, UDP, CAN, ...) stays, but host names,
+/// paths and serial numbers are replaced or removed. `number` keeps the values of several sensors distinct.
 fn connect(text: &str, number: usize) -> String {
     // Addresses reserved for documentation. Source: RFC 5737.
     let host = |address: &str| {
@@ -157,14 +157,14 @@ fn string_len(text: &str, quote: char) -> usize {
     text.len()
 }
 
-/// TOML key whose value follows `text`, without the names of its tables.
+/// TOML key of the value that comes right after `text`, without the names of its tables.
 fn key_before(text: &str) -> &str {
     let line = text.rsplit(['\n', ',', '{', '[']).next().unwrap_or_default();
     let key = line.split_once('=').map_or("", |(key, _)| key);
     key.rsplit('.').next().unwrap_or_default().trim().trim_matches(['"', '\''])
 }
 
-/// The anonymised form of a string of the vehicle file.
+/// The text that replaces a string of the vehicle file in the anonymised file.
 fn other_string(string: &str, key: &str, names: &[(String, String)], count: &mut usize) -> String {
     let inner = string.trim_matches(['"', '\'']);
     if let Some((_, other)) = names.iter().find(|(name, _)| name == inner) {

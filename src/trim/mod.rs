@@ -233,7 +233,7 @@ fn nothing_kept(args: &Trim, files: &[PathBuf]) -> Result<Failure, Failure> {
     )))
 }
 
-/// Shows what was trimmed, with dive times.
+/// Shows the parts that were trimmed, with dive times.
 fn tell(
     args: &Trim,
     (trimmed, clock): (&Trimmed, DiveClock),

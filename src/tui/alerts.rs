@@ -24,7 +24,7 @@ pub(super) struct AlertRow {
     pub(super) advice: String,
 }
 
-/// Rows of the live alerts, most urgent first, and the number of alerts left out.
+/// Rows of the live alerts, most urgent first, and the number of alerts for which there is no row.
 pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     let around = dive.view().surroundings();
     let (shown, hidden) = dive.view().alert_list().shown();
@@ -49,7 +49,7 @@ pub(super) fn rows(dive: &Loop) -> (Vec<AlertRow>, usize) {
     (shown.iter().filter(|alert| alert.is_live()).map(row).collect(), hidden)
 }
 
-/// Hands the operator's commands to the loop.
+/// Hands the operator's commands to the loop, if the dive accepts commands.
 pub(super) struct Desk(Option<ConsolePort>);
 
 impl Desk {

@@ -38,7 +38,7 @@ pub(super) struct Playing {
     pub(super) paused: bool,
 }
 
-/// Content of the screen.
+/// Data that the screen shows.
 pub(super) struct Page {
     mode: &'static str,
     pub(super) ink: Palette,
@@ -135,7 +135,7 @@ impl Page {
     /// Draws the panels within the available room.
     fn panels(&self, shot: &ScreenFrame, rows: &mut Rows<'_>) {
         // Room is reserved: alerts and messages have at least two rows, and the wall has two strips. Each panel except
-        // the last has a title. The wall's strips by clock hour get room before cautions do.
+        // the last has a title. The wall's strips by clock hour get room before alerts of the level caution.
         let left = usize::from(rows.left()).saturating_sub(3 + 3 + 1 + 2);
         let well = shot.sensors.iter().filter(|sensor| sensor.state == SensorState::Ok).count();
         let wanted = shot.sensors.len() - well + panels::sensor_rows(well, usize::from(rows.width()));

@@ -25,9 +25,9 @@ use super::wall::{Cell, Clock, WallNews};
 
 /// Averaging window for a sensor's rate of readings, in the time of the data.
 const RATE_OVER: DurNs = DurNs(2_000_000_000);
-/// Maximum number of messages kept between two frames.
+/// Maximum number of messages kept until the next frame.
 const MOST_MESSAGES: usize = 64;
-/// Number of sections on either side of the vehicle that every frame includes.
+/// Number of sections on each side of the vehicle that are in every frame.
 const NEAR: i64 = 8;
 
 /// A frame of the screen.
@@ -71,7 +71,7 @@ pub(super) struct FrameBuilder {
     /// Sections that have changed since the last frame; `None` if all have to be shown.
     changed: Option<BTreeSet<i64>>,
     clock: Option<Clock>,
-    /// Number of readings of each sensor, at two times.
+    /// Number of readings of each sensor at two times, from which the rate follows.
     counted: [Option<(MonoNs, Vec<u64>)>; 2],
     recorded: RecordingState,
     ports: BTreeMap<usize, String>,

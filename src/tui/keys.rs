@@ -1,4 +1,4 @@
-//! Keys of the terminal.
+//! Reads the keys that a terminal sends as bytes.
 
 use crate::play::Key as Playing;
 
@@ -36,7 +36,7 @@ impl Key {
     }
 }
 
-/// Keys that some bytes represent. A terminal sends all bytes of a key at once.
+/// Keys that the bytes stand for. A terminal sends all bytes of a key at once.
 pub(crate) fn keys(bytes: &[u8]) -> Vec<Key> {
     let text = String::from_utf8_lossy(bytes);
     let mut rest = text.as_ref();

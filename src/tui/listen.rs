@@ -1,4 +1,4 @@
-//! Reads the terminal's keys and counts signals, on a separate thread.
+//! Reads the terminal's keys and counts the signals that end the program, on a separate thread.
 
 use std::io;
 use std::sync::Arc;

@@ -109,8 +109,7 @@ impl Tui {
         Ok(Self { eye, wanted, sender: Some(sender), thread: Some(thread), done, is_live })
     }
 
-    /// Passes a frame to the renderer. In a live dive, a frame that finds no room is dropped. The next frame then shows
-    /// all again.
+    /// Keys that the bytes stand for. A terminal sends all bytes of a key at once.
     fn show(&mut self, dive: &Loop, stopped: Option<Stop>) {
         let Some(sender) = &self.sender else { return };
         if self.is_live && sender.is_full() {

@@ -1,11 +1,11 @@
-//! Kind and state of the dive that is shown.
+//! Kind and state of the dive that the screen shows.
 
 use crossbeam::channel::Sender;
 use headrace_replay::playback::PlaybackCommand;
 
 /// Kind of dive shown.
 pub(crate) enum Mode {
-    /// A dive on ports. No thread may wait.
+    /// A dive on ports. No thread of the dive may wait for the screen.
     Live,
     /// The simulated dive of `headrace demo`.
     Demo,

@@ -20,7 +20,7 @@ use crate::output::append;
 
 /// Number of rows of the strips that show coverage by clock hour.
 pub(super) const CLOCK_ROWS: usize = HOURS;
-/// Width of a sensor's entry with and without the age of its data, columns.
+/// Widths of a sensor's entry, columns: with the age of its data, and without it.
 const LAMP_COLUMNS: [usize; 2] = [24, 19];
 /// Width of the labels before the wall's strips, columns.
 const LABEL: usize = 6;
@@ -246,7 +246,7 @@ pub(super) fn sensors(shot: &ScreenFrame, ink: Palette, room: usize, rows: &mut 
     let columns = usize::from(rows.width());
     let has_room = sensor_rows(shot.sensors.len() - unwell, columns) + unwell <= room;
     let across = (columns / LAMP_COLUMNS[usize::from(!has_room)]).max(1);
-    // One row is reserved for healthy sensors.
+    // One row is reserved for the healthy sensors, if there are any.
     let rows_of_ill = unwell.min(room.saturating_sub(usize::from(unwell < shot.sensors.len())));
     let hidden = shot.sensors.len().saturating_sub(rows_of_ill + (room - rows_of_ill) * across);
     let more = if hidden > 0 { format!(", {hidden} not shown") } else { String::new() };

@@ -25,8 +25,8 @@ use crate::play::{Hand, Key as PlaybackKey};
 
 /// Minimum interval between two draws of the screen.
 const EVERY: Duration = Duration::from_millis(100);
-/// Time without a new frame after which a live dive's screen is shown as stale. It equals `OLD_AFTER` of the
-/// live state.
+/// Time without a new frame after which a live dive's screen is shown as stale. It equals the constant `OLD_AFTER` of
+/// the live state.
 const OLD_AFTER: Duration = Duration::from_secs(2);
 
 /// Draws frames and handles keys.

@@ -116,7 +116,7 @@ pub(super) fn restore() {
     }
 }
 
-/// Restores the terminal within half a second, from a thread other than the renderer's.
+/// Restores the terminal within half a second, called from a thread other than the renderer's.
 pub(super) fn restore_from_elsewhere() {
     leave();
     for _ in 0..STEPS {
@@ -126,7 +126,7 @@ pub(super) fn restore_from_elsewhere() {
         thread::sleep(STEP);
     }
     restore_settings();
-    // If the terminal reads nothing, writing blocks, so the wait for the writing thread is limited.
+    // If the terminal reads nothing, writing blocks, so another thread writes, and the wait for it is limited.
     let writing = thread::spawn(restore);
     for _ in 0..STEPS {
         if writing.is_finished() {
@@ -204,7 +204,7 @@ mod tests {
         let mut master = File::from(master);
         let reading = thread::spawn(move || {
             let (mut all, mut bytes) = (Vec::new(), [0; 4096]);
-            // Once all handles of a pseudo-terminal's other end are closed, reading returns an error.
+            // Reading returns an error once all handles of the pseudo-terminal's other end are closed.
             while let Ok(count @ 1..) = master.read(&mut bytes) {
                 all.extend_from_slice(&bytes[..count]);
             }

@@ -7,7 +7,7 @@ use headrace_monitor::run::Loop;
 
 /// Number of parts into which the perimeter is divided for clock positions.
 const PARTS: usize = 96;
-/// Number of clock hours by which positions on the perimeter are named.
+/// Number of clock hours, which name positions on the perimeter.
 pub(super) const HOURS: usize = 12;
 
 /// Converts an arc length to a clock hour.
@@ -54,7 +54,7 @@ pub(super) enum Known {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Cell {
     pub(super) known: Known,
-    /// Diameter of the largest hole relative to the target.
+    /// Diameter of the section's largest hole, divided by the target.
     pub(super) share: Option<f64>,
     /// Clock hours that have samples within half the target. Bit 0 is 12 o'clock.
     pub(super) seen: u16,
@@ -77,8 +77,8 @@ impl Cell {
         };
         let mut seen = 0;
         if section.samples > 0 {
-            // A passing hole is at most as wide as the target, so wall within half the target of a sample
-            // counts as covered.
+            // Wall within half the target of a sample counts as covered, because a hole that passes is at most as wide
+            // as the target.
             let (from_m, to_m) = sections.bounds_m(index);
             let half_m = sections.target().max_hole_m / 2.0;
             let (from_m, to_m) = (from_m - half_m, to_m + half_m);
@@ -88,7 +88,7 @@ impl Cell {
                 }
             });
         }
-        // At the clock position of a hole that is too large, the hour counts as not covered.
+        // A clock hour counts as not covered if a hole that is too large lies there.
         if let Some(hole) = section.hole.filter(|_| matches!(known, Known::Missed | Known::CannotSay)) {
             seen &= !clock.bit(hole.arc_m);
         }

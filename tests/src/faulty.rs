@@ -84,7 +84,7 @@ impl End {
         Self { connect: stand.connect().clone(), link: None, stand: Some(stand), beside: false }
     }
 
-    /// The end of a device on a line that it shares with another sensor. `other` is the end of that sensor.
+    /// The end of a device on a line that it shares with another device, whose end is `other`.
     pub fn beside(other: &Self) -> Self {
         Self { connect: other.connect.clone(), link: None, stand: None, beside: true }
     }
@@ -199,7 +199,7 @@ impl Wire {
         }
     }
 
-    /// Counts frames as sent whole that were sent without [`Wire::whole`].
+    /// Adds to the count of whole frames those that were sent without [`Wire::whole`].
     pub fn count(&self, frames: u64) {
         self.control.whole.fetch_add(frames, Ordering::SeqCst);
     }
@@ -217,7 +217,7 @@ pub struct Faulty {
 }
 
 impl Faulty {
-    /// Starts the devices of one line. They run until the result is dropped.
+    /// Starts the devices of one line. They run until the returned value is dropped.
     pub fn start(devices: Vec<Emulated>, end: End, fault: Box<dyn Fault>) -> Self {
         let control = Arc::new(Control::default());
         control.unplugged.store(end.stand.is_none(), Ordering::SeqCst);

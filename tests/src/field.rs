@@ -1,4 +1,5 @@
-//! The scene `vita1-field` with settings that suit it, and the errors of the estimated trajectory.
+//! The scene `vita1-field` with navigation settings that match its sensor errors, and the errors of the estimated
+//! trajectory.
 
 use headrace_fusion::Fix;
 use headrace_geometry::frames::{Tunnel, Vec3};
@@ -113,7 +114,7 @@ pub fn field(seed: u64, length_m: f64) -> Scene {
     field_with(seed, length_m, SETTINGS, "")
 }
 
-/// The field scene with the `[navigation]` settings `settings`, and without the text `without`.
+/// The field scene with the `[navigation]` settings `settings`, and with the text `without` removed.
 pub fn field_with(seed: u64, length_m: f64, settings: &str, without: &str) -> Scene {
     let scene = include_str!("../../deploy/scenes/vita1-field.toml");
     let length = format!("distance_m = {length_m}");

@@ -23,7 +23,7 @@ const RAYS: u32 = 48;
 /// Number of parts into which a section is divided when its earliest fail is searched for.
 pub const PARTS: u32 = 16;
 /// Tolerance of the chainage from which all heads have passed the wall, m. The program's own value may differ by this
-/// much. It is updated five times a second, and uses the farthest wall as the reach of a tilted head.
+/// much. The program updates its value five times a second, and uses the farthest wall as the reach of a tilted head.
 pub const NEAR_M: f64 = 0.12;
 /// Distance below which a backward motion of the vehicle counts as sway, m.
 const WAY_BACK_M: f64 = 0.05;
@@ -54,7 +54,8 @@ pub fn reached(dive: &Dive) -> Vec<Reached> {
     all
 }
 
-/// Chainage from which on all heads pass every place, m. The places where the heads started determine it.
+/// Chainage from which on all heads pass every place of the wall, m. It follows from the places at which the heads
+/// started.
 pub fn all_passed_from_m(reached: &[Reached]) -> f64 {
     reached.iter().map(|reached| reached.front_m).fold(f64::INFINITY, f64::min)
 }
@@ -114,7 +115,8 @@ pub struct Flag {
     pub start_m: f64,
     /// First moment after which forward motion can't undo the fail, seconds.
     pub due_s: Option<f64>,
-    /// Earliest possible value of `due_s`, seconds. It allows for the resolution of the search, one part of a section.
+    /// Earliest possible value of `due_s`, seconds. It allows for the resolution of the search, which is one part of a
+    /// section.
     pub may_s: Option<f64>,
     /// End of the dive, seconds.
     pub end_s: f64,
@@ -216,7 +218,7 @@ impl Journey {
         let ends = [section.start_m, section.end_m];
         let radius_m = 0.5 * (target_m + sd * section.hole_sd_m);
         let due_m = |wall: &Wall, early_m: f64| {
-            // For the earliest possible due moment, the tolerance `NEAR_M` counts the other way.
+            // For the earliest possible due moment, the tolerance `NEAR_M` is applied in the opposite direction.
             let near_m = if early_m > 0.0 { -NEAR_M } else { NEAR_M };
             let passed_m = all_passed_from_m(&self.reached) + near_m;
             Some(first_failing_m(wall, ends, radius_m, passed_m)? + radius_m - early_m)
@@ -234,8 +236,8 @@ impl Journey {
         let late_m = || {
             let raised_s = raised_s?;
             let before = |reached: &&Reached| reached.at.as_secs_f64() <= raised_s;
-            // If the reach or the standard deviation jumps, the flag can be raised at the next tick at the earliest.
-            // Such a short delay isn't late.
+            // If the reach or the standard deviation jumps, the flag can be raised at the next tick at the earliest. A
+            // delay of this length doesn't count as late.
             let soon_s = 2.0 * EVERY.as_secs_f64();
             first(0.0).filter(|due_s| raised_s > due_s + soon_s)?;
             Some(self.reached.iter().take_while(before).last()?.rear_m - due_m(&self.whole, 0.0)?)

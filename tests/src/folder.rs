@@ -8,8 +8,8 @@ use serde_json::Value;
 
 use crate::short_dive::{SCENE, VEHICLE};
 
-/// A test repeats a live dive, each time four times as long, until its report is as expected. The first dive that is
-/// longer than this is the last, s.
+/// Length of a live dive after which a test gives up, s. A test repeats a dive, each time four times as long, until the
+/// report is as expected.
 const LONG_S: u32 = 100;
 
 /// The program under test, ready for arguments.
@@ -82,8 +82,8 @@ impl Folder {
 
     /// Repeats a live dive with these arguments of `run` until `is_enough` accepts its report.
     ///
-    /// The first dive takes 3 s, and each further dive takes four times as long as the previous one, for busy machines.
-    /// The log is `dive.mcap`. Returns the last answer and the last report.
+    /// The first dive takes 3 s, and each further dive takes four times as long as the previous one, because a busy
+    /// machine may need more time. The log is `dive.mcap`. Returns the last answer and the last report.
     pub fn dive_until(&self, arguments: &[&str], is_enough: impl Fn(&Value) -> bool) -> (Answer, Value) {
         let mut seconds = 3;
         loop {

@@ -26,7 +26,7 @@ fn counted(codec: &mut impl Codec, bytes: &[u8]) -> u64 {
     codec.counts().good_frames
 }
 
-/// A fault that changes bytes in transit. Some go undetected, because heads' returns have no checksum.
+/// A fault that changes bytes in transit. Some changes go undetected, because heads' returns have no checksum.
 pub struct Garbled {
     random: Random,
     change: fn(&mut Random, &[u8]) -> Vec<u8>,

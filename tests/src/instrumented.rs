@@ -134,20 +134,20 @@ pub fn dive(vehicle: &str, scene: &str) -> Dive {
     dive_in_ticks(vehicle, scene, Pace::default().tick)
 }
 
-/// As [`dive`], in ticks of another length.
+/// As [`dive`], but in ticks of length `tick`.
 pub fn dive_in_ticks(vehicle: &str, scene: &str, tick: DurNs) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, scene.vehicle.mission(), Pace { tick, ..Pace::default() })
 }
 
-/// As [`dive`], but the loop uses this profile.
+/// As [`dive`], but the loop uses the profile `profile`.
 pub fn dive_with_profile(vehicle: &str, scene: &str, profile: Profile) -> Dive {
     let scene = parse(vehicle, "", scene);
     watched(&scene, &scene.vehicle, Mission { profile, ..scene.vehicle.mission() }, Pace::default())
 }
 
-/// Simulates a scene with one vehicle and one polygon. The loop uses another vehicle file and another polygon, the
-/// second of each pair.
+/// Simulates a scene with the first vehicle file and the first polygon of the pairs. The loop uses the second vehicle
+/// file and the second polygon.
 ///
 /// A polygon has one corner `y_m,z_m` per line.
 pub fn dive_believing(vehicle: [&str; 2], polygon: [&str; 2], scene: &str) -> Dive {

@@ -40,7 +40,7 @@ impl Checker<'_> {
                     let fits = |one: &&Value| faults(one, value).is_empty();
                     wanted.as_array().unwrap().iter().filter(fits).count() == 1
                 }
-                // For `contentEncoding`, only the encoding is checked, not the decoded content.
+                // For `contentEncoding`, only the encoding is checked, and not the decoded content.
                 "contentEncoding" => wanted == "base64" && base64(value.as_str().unwrap()).is_some(),
                 "const" => value == wanted,
                 "enum" => wanted.as_array().unwrap().contains(value),

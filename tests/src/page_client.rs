@@ -272,7 +272,7 @@ impl Viewer {
         }
     }
 
-    /// Reads messages until the dive has begun. Before the beginning, a replay can't be controlled.
+    /// Reads messages until the dive has begun. A replay can't be controlled before it has begun.
     pub fn until_begun(&mut self) {
         self.until("a state", |viewer| !viewer.state.is_null());
     }
@@ -319,7 +319,7 @@ impl Viewer {
                 self.hello = value;
             }
             "state" => {
-                // As on the page, known alerts get the state's figures.
+                // As on the page, alerts that are already known get the figures of the new state.
                 for alert in value["alert_list"].as_array().into_iter().flatten() {
                     let known = alert["number"].as_u64().and_then(|number| self.alerts.get_mut(&number));
                     if let Some(known) = known {

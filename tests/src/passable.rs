@@ -17,14 +17,14 @@ use crate::random_dives::Draw;
 use crate::scenes;
 use crate::truth;
 
-/// This time at the start of a dive isn't evaluated, s. During it, the filter learns the biases of the inertial unit.
+/// Time at the start of a dive that isn't evaluated, s, because the filter then learns the biases of the inertial unit.
 const SETTLES_S: f64 = 100.0;
 /// Length of the evaluated part of a dive, m.
 const JUDGED_M: f64 = 8.0;
 /// Fraction of the evaluated sections that must pass, as in a dive at the planned speed. No section may pass although
 /// its true hole exceeds the target.
 const PASSING: f64 = 0.95;
-/// One evaluated section out of this many may fail.
+/// Number of evaluated sections of which one may fail.
 const FAILING: usize = 20;
 /// Speeds that are tried in the search for the largest passing speed, as multiples of the first speed. `ABOVE` has
 /// speeds above the first speed, `BELOW` has speeds below it.
@@ -73,7 +73,7 @@ pub struct Compared {
     pub plan_mps: f64,
     /// Advised speed while the vehicle drives at the planned speed, m/s.
     pub advised_mps: f64,
-    /// Largest speed near the advised one at which sections truly pass, m/s; `None` if there is none.
+    /// Largest speed near the advised speed at which sections truly pass, m/s; `None` if there is none.
     pub true_mps: Option<f64>,
     /// Result of the dive at the planned speed.
     pub planned: Outcome,
@@ -148,7 +148,7 @@ impl Outing {
     }
 
     /// The vehicle and dive that belong to a seed. Consecutive seeds rotate through the vehicles. In every second round
-    /// through the vehicles, they sway. All other values are drawn at random.
+    /// through the vehicles, the vehicles sway. All other values are drawn at random.
     pub fn drawn(seed: u64) -> Self {
         let mut draw = Draw::new(seed ^ 0x5eed_ad71);
         let turn = usize::try_from(seed).unwrap();

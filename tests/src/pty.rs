@@ -78,7 +78,8 @@ impl OnTerminal {
         command.env("TERM", "xterm").env_remove("NO_COLOR");
         command.stdin(slave.try_clone().unwrap()).stderr(slave.try_clone().unwrap()).stdout(slave);
         let child = command.spawn().unwrap();
-        // The `Command` value still holds copies of the program's end of the terminal, which would keep it open.
+        // The `Command` value still holds copies of the program's end of the terminal, which would keep the terminal
+        // open.
         drop(command);
         let (sender, pieces) = sync_channel(1 << 10);
         let mut master = File::from(master);

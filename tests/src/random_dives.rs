@@ -125,7 +125,8 @@ fn vehicle(kind: Kind, draw: &mut Draw, speed_mps: f64) -> (String, f64) {
         Kind::Sparse => draw.one_of(&["slow", "medium"]),
         _ => draw.one_of(&["medium", "fast", "faster", "fastest", "fastest"]),
     };
-    // Heads are all at one place, or one behind the other, or side by side. Side by side, some of them face aft.
+    // Heads are all at one place, or one behind the other, or side by side. If they are side by side, some of them face
+    // aft.
     let places = if kind == Kind::Occluded { 2 } else { draw.below(3) };
     for head in 0..heads {
         let place = match places {

@@ -51,7 +51,7 @@ pub const DEPTH: &str = "plugin = \"bar100\"\n";
 
 /// A sensor for a [`Rig`]: its table in the vehicle file, the device's end of the line, and the line's fault.
 pub struct Sensor {
-    /// Table of the sensor, without id and connect.
+    /// Table of the sensor, without the keys `id` and `connect`.
     pub text: &'static str,
     /// Device's end of the line.
     pub end: End,
@@ -173,7 +173,7 @@ impl Rig {
         view.clone()
     }
 
-    /// Runs the dive until a sensor has `more` good frames more than now.
+    /// Runs the dive until a sensor has received `more` further good frames.
     #[track_caller]
     pub fn more(&mut self, number: usize, more: u64) -> View {
         let from = self.view.good[number];

@@ -32,7 +32,8 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// Runs the program in a folder on a terminal of `columns` columns. It gets `TERM=xterm` and these variables.
+    /// Runs the program in a folder on a terminal of `columns` columns. The program gets `TERM=xterm` and the
+    /// environment variables `variables`.
     pub fn run(folder: &Folder, arguments: &[&str], columns: u16, variables: &[(&str, &str)]) -> Self {
         Self::sized(folder, arguments, (columns, 24), variables)
     }
@@ -101,7 +102,7 @@ impl Screen {
         terminal
     }
 
-    /// The page as text without trailing spaces. The program may leave these out.
+    /// The page as text. Trailing spaces are removed, because the program may leave them out.
     pub fn page(&self) -> String {
         let page = self.terminal().screen().contents();
         page.lines().map(str::trim_end).collect::<Vec<_>>().join("\n")

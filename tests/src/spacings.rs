@@ -33,12 +33,12 @@ struct Step {
     /// Change of chainage and arc length from `from` to the end of the step, m. The arc length changes along the
     /// shorter way round the wall.
     by: [f64; 2],
-    /// Whether a step in the same direction directly precedes this step, and whether one directly follows it.
+    /// Whether a step in the same direction directly precedes this step, and whether such a step directly follows.
     joined: [bool; 2],
 }
 
 impl Step {
-    /// Chainage at which the step passes over the arc length `arc_m`; `None` if it doesn't.
+    /// Chainage at which the step passes over the arc length `arc_m`; `None` if it doesn't pass over it.
     fn x_at(&self, arc_m: f64, perimeter_m: f64, with_ends: bool) -> Option<f64> {
         let along_m = math::wrap_signed(arc_m - self.from[1], perimeter_m);
         let share = along_m / self.by[1];

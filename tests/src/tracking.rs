@@ -74,7 +74,7 @@ enum Said {
     Consistency(usize, Consistency),
 }
 
-/// A navigation whose filter states can be observed by a test.
+/// A navigation whose filter states a test can observe.
 pub trait Transparent: Navigation + 'static {
     /// Latest filter state and its time, if the navigation has a state.
     fn estimate(&self) -> Option<(MonoNs, State, Factors<ERRORS>)> {

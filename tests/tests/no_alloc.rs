@@ -1,5 +1,5 @@
-//! The armed loop allocates nothing. The test runs a million packets of a four-head dive with recorder and notice
-//! outlet.
+//! The armed loop allocates nothing. The test feeds a million packets of a dive with four heads to a loop with a
+//! recorder and a notice outlet.
 //!
 //! The allocator counts calls on the loop's thread. This test doesn't check locks, because clippy.toml forbids lock
 //! types in the whole workspace.
@@ -106,7 +106,8 @@ fn million_packets_need_no_allocation() {
     for sensor in &vehicle.sensors {
         app.add_device(sensor.as_ref()).unwrap();
     }
-    // Nobody empties this outlet, so it becomes full. Dropping the oldest notice must not allocate either.
+    // Nobody empties this outlet, so it becomes full and drops its oldest notices. Dropping them must not allocate
+    // either.
     let (outlet, notices) = NoticeOutlet::new(1000);
     app.add_plugin(&outlet).unwrap();
     let header = LogHeader {
@@ -152,7 +153,7 @@ fn million_packets_need_no_allocation() {
             allocated += allocations(|| consumed = dive.tick(until));
             packets += consumed;
             if consumed == 0 {
-                // The recorder has fallen behind, so the loop holds packets back and none is lost.
+                // The recorder has fallen behind, so the loop holds packets back, and no packet is lost.
                 waited += 1;
                 std::thread::sleep(std::time::Duration::from_millis(1));
             }

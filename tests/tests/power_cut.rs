@@ -1,4 +1,4 @@
-//! `kill -9` at random moments. Every log is readable and loses at most the last second.
+//! `kill -9` at random moments. After each kill, the log is readable, and at most the last second is lost.
 //!
 //! The log contains everything that was displayed more than a second before the kill. The log's replay gives the same
 //! dive up to the log's end, bit for bit.
@@ -15,14 +15,15 @@ use serde_json::Value;
 
 /// Number of dives that are killed.
 const KILLS: usize = 200;
-/// Number of dives that run at the same time.
+/// Number of dives that the test runs at the same time.
 const AT_ONCE: usize = 6;
 /// Longest time from the start of a dive to its kill, ms.
 const LONGEST_MS: u64 = 2200;
 /// Longest span of data that a kill may lose.
 const MAY_COST: Duration = Duration::from_secs(1);
 
-/// A dive of a minute and a half. A part of it is too fast, so that there are flags to lose.
+/// A dive of a minute and a half. In a part of it the vehicle is too fast, so that there are flags that a kill could
+/// lose.
 const SCENE: &str = r#"name = "a dive to kill"
 vehicle = "vehicle.toml"
 
@@ -50,7 +51,7 @@ fn wall_clock() -> Instant {
     Instant::now()
 }
 
-/// Counts over all killed dives.
+/// Counts of kills and results over all killed dives.
 #[derive(Default)]
 struct Count {
     /// Number of kills before the log had a header.
@@ -61,8 +62,8 @@ struct Count {
     lines: AtomicUsize,
     /// Number of recorded results that a replay of the log reproduced bit for bit.
     same: AtomicU64,
-    /// Longest time for which the test waited for the machine's disk or processor, ns. It may wait because other work
-    /// uses them.
+    /// Longest time for which the test waited for the machine's disk or processor, ns. Other work on the machine may
+    /// use them.
     late_ns: AtomicU64,
 }
 
@@ -89,7 +90,8 @@ fn killed(folder: &Folder, arguments: &[&str], after: Duration, count: &Count) -
         out.lines().map_while(Result::ok).map(|line| (wall_clock(), line)).collect::<Vec<_>>()
     });
     std::thread::sleep(after);
-    // The kill takes effect a little later than this moment. The second before the kill is therefore counted from here.
+    // The kill takes effect a little later than this moment. Counting the second before the kill from this moment is
+    // therefore on the safe side.
     let moment = wall_clock();
     let ended = dive.try_wait().unwrap().is_some();
     dive.kill().ok();
@@ -139,7 +141,7 @@ fn kill(folder: &Folder, number: usize, count: &Count) {
     match answer.code {
         Some(0) => assert!(ended, "{which}: no loss is reported: {report}"),
         Some(3) => assert!(same > 0 && report["losses"][0].is_string(), "{which}: {report}"),
-        // The killed dive had not published any result yet.
+        // In this case, the killed dive had not published any result yet.
         code => assert!(code == Some(1) && same == 0 && lines.is_empty(), "{which}: {code:?}, {report}"),
     }
     count.same.fetch_add(same, Ordering::Relaxed);

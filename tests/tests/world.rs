@@ -1,4 +1,4 @@
-//! Dives in a simulated world of faults. The dive of every seed must satisfy all invariants.
+//! Dives in a simulated world of faults. For every seed, the dive must satisfy all invariants.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
@@ -19,12 +19,13 @@ const SEEDS: std::ops::Range<u64> = 0..300;
 /// detect the sabotage.
 const ENOUGH: u64 = 200;
 
-/// Durations of stalls, ms, and the time at which they begin.
+/// Durations of the stalls in the tests, ms. `STALL_BEGINS` is the time at which each stall begins.
 const STALLS_MS: [i64; 6] = [100, 250, 500, 1300, 2500, 5000];
 const STALL_BEGINS: DurNs = DurNs::from_millis(5_000);
 /// Largest error of the estimated speed while the position counts as reliable, m/s.
 const SPEED_ERROR_MPS: f64 = 0.05;
-/// Largest error of the chainage, and largest error of its change between two updates, in standard deviations plus m.
+/// Largest error of the chainage, and of the change of chainage between two updates. It is the number `SDS` of standard
+/// deviations plus `ROUNDED_M`.
 const SDS: f64 = 3.0;
 const ROUNDED_M: f64 = 0.01;
 
@@ -40,8 +41,8 @@ fn lived(
     (broken(&lived, &replayed), lived)
 }
 
-/// Finds as few faults as possible with which the world of a seed breaks an invariant. Returns these faults and the
-/// broken invariants as text.
+/// Reduces the faults of a seed's world to as few as possible with which an invariant is still broken. Returns the
+/// remaining faults and the broken invariants as text.
 fn reduced(folder: &Folder, seed: u64, sabotage: Option<Sabotage>, faults: &[Fault]) -> String {
     let left = fewest(faults, |faults| !lived(folder, seed, sabotage, Some(faults)).0.is_empty());
     let (broken, lived) = lived(folder, seed, sabotage, Some(&left));
@@ -128,15 +129,15 @@ fn line_stall(lines: std::ops::Range<usize>, ms: i64) -> Vec<Fault> {
     lines.map(|line| Fault::Cable(line, Window { what: CableFault::Held, from, to })).collect()
 }
 
-/// Alerts and causes that a stall may have, because heads are not asked: after 2 s, they are silent. In 5 s, the vehicle
-/// drives nearly as far as the target.
+/// Whether a stall of `ms` may raise the alert or cause `kind`. During a stall, the program doesn't ask the heads, so
+/// they count as silent after 2 s. In 5 s, the vehicle drives nearly as far as the target.
 fn may_be_raised(kind: &str, ms: i64) -> bool {
     matches!(kind, "position_doubtful" | "cannot_say")
         || ms >= 2000 && matches!(kind, "sensor_silent" | "sensor_stalled" | "no_sonar")
         || ms >= 5000 && matches!(kind, "missed" | "head_silent" | "head_stalled" | "position_lost")
 }
 
-/// Properties that a stall broke, as text. Without a stall, the dive raises the alerts `usual`.
+/// Texts about the properties that a stall broke. Without a stall, the dive raises the alerts `usual`.
 fn broken_by_stall(lived: &DiveResult, usual: &[&str], ms: i64) -> Vec<String> {
     let mut broken = Vec::new();
     let mut last: Option<Position> = None;

@@ -1,7 +1,7 @@
 //! Sounding density: number of samples per node of a square grid, as survey specifications require.
 //!
-//! A grid does not detect all gaps: a helix can fill every node and still leave strips wider than the target. So the
-//! density is given in addition to the holes, and never replaces them. Source: docs/why/coverage.md, "For surveyors".
+//! A grid does not detect all gaps: a helix can fill every node and still leave strips wider than the target. The
+//! density is therefore given in addition to the holes, and never replaces them.
 
 use headrace_geometry::math;
 use headrace_geometry::snapshot::stateful;

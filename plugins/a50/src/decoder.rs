@@ -24,7 +24,7 @@ const LEAST_BEAMS: u8 = 3;
 /// Altitude range of an A50, m.
 const ALTITUDES_M: core::ops::RangeInclusive<f64> = 0.05..=50.0;
 /// Largest plausible delay between the sound's reflection and the report. Reports with a larger delay are withheld. The
-/// two-way travel time is only 70 ms.
+/// two-way travel time at the largest altitude is only about 70 ms.
 const MOST_DELAY_US: i64 = 2_000_000;
 
 /// Decoding settings of an A50.
@@ -51,9 +51,9 @@ pub struct Withheld {
     pub beams: u64,
     /// Reports whose altitude is outside the measuring range.
     pub altitude: u64,
-    /// Reports whose figure of merit is too large, or negative.
+    /// Reports whose figure of merit is larger than `fom_max_mps`, or negative.
     pub fom: u64,
-    /// Reports whose speed is too large.
+    /// Reports whose speed is larger than `max_speed_mps`.
     pub speed: u64,
     /// Reports whose timestamps contradict each other.
     pub times: u64,

@@ -13,14 +13,15 @@ pub const CARRIERS: [Carrier; 2] = [Carrier::Tcp, Carrier::Udp];
 const SILENCE: DurNs = DurNs::from_millis(200);
 /// Number of consecutive lines without a velocity after which the device's format counts as unknown.
 ///
-/// The device reports several times a second, so the count is reached within a few seconds.
+/// The device reports several times a second, so this number is reached within a few seconds.
 const NOT_UNDERSTOOD_FROM: u32 = 20;
 
 /// Driver of an A50.
 pub struct A50Driver {
     cutter: Cutter<Lines, MAX_LINE_BYTES>,
     velocities: u64,
-    /// Number of lines since the latest velocity (`others`), and format named in the latest of these lines (`format`).
+    /// `others`: number of lines received since the latest velocity. `format`: format that the latest of these lines
+    /// names.
     others: u32,
     format: Option<String>,
 }

@@ -26,7 +26,8 @@ pub enum Against {
     Water,
 }
 
-/// A velocity report, in the device's units and axes: x forward, y right, z down (viewing direction).
+/// A velocity report, in the device's units and axes: x forward, y right, z down (the direction in which the device
+/// looks).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Velocity {
     /// Reference of the velocity.
@@ -41,7 +42,7 @@ pub struct Velocity {
     pub valid_beams: u8,
     /// Whether the device marks velocity and altitude as valid.
     pub is_valid: bool,
-    /// Status bits: 1 = too hot; others are undefined.
+    /// Status bits. The bit with value 1 means too hot; the other bits are undefined.
     pub status: u8,
     /// Device timestamps of the reflection and of sending the report, microseconds.
     pub times_us: Option<[i64; 2]>,
@@ -159,7 +160,7 @@ fn valid_beams(next: u8, lexer: &mut SliceLexer<'_>) -> Result<u8, Error> {
     Ok(valid)
 }
 
-/// True if the object's `type` is that of a velocity report.
+/// Whether the object's `type` is the type of a velocity report.
 fn is_velocity(line: &str) -> Result<bool, Error> {
     let mut is_velocity = false;
     SliceLexer::new(line.as_bytes()).exactly_one(SliceLexer::ws_peek, |next, lexer| {

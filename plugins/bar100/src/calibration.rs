@@ -25,9 +25,9 @@ const PA_PER_BAR: f64 = 1.0e5;
 /// Reference of a sensor's pressure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PressureMode {
-    /// PR: relative to ambient air, which enters through a vent.
+    /// Mode PR: the pressure is relative to ambient air, which enters through a vent.
     Vented,
-    /// PA: relative to a sealed reference of one bar.
+    /// Mode PA: the pressure is relative to a sealed reference of one bar.
     Sealed,
     /// PAA: relative to vacuum.
     Absolute,
@@ -61,7 +61,7 @@ pub enum CalibrationError {
     /// The sensor's memory has an undefined pressure mode.
     #[error("reading cell 0x12: pressure mode {0}; defined are 0 (PR), 1 (PA) and 2 (PAA)")]
     Mode(u8),
-    /// The limits of the pressure range are impossible.
+    /// The limits of the pressure range are not finite, or not in increasing order.
     #[error(
         "reading the pressure limits: {p_min_bar} to {p_max_bar} bar; both must be finite, the second larger"
     )]
@@ -76,7 +76,8 @@ pub enum CalibrationError {
 impl PressureMode {
     /// Converts the two mode bits of memory cell 0x12 to a pressure mode.
     ///
-    /// Errors: a mode of 3 or more. It must not be guessed, because a wrong mode shifts the depth by ten metres.
+    /// Errors: a mode of 3 or more. Such a mode must not be replaced by a guess, because a wrong mode shifts the depth
+    /// by ten metres.
     pub fn from_wire(mode: u8) -> Result<Self, CalibrationError> {
         match mode {
             0 => Ok(Self::Vented),
@@ -137,7 +138,7 @@ impl Calibration {
         Ok(Self { mode, p_min_bar, p_max_bar })
     }
 
-    /// Absolute pressure of a number of counts, Pa. A vented sensor uses `ambient_bar`, the pressure of the
+    /// Converts raw pressure counts to absolute pressure, Pa. A vented sensor uses `ambient_bar`, the pressure of the
     /// ambient air.
     pub fn pressure_pa(&self, counts: u16, ambient_bar: f64) -> f64 {
         let above_bar =
@@ -152,7 +153,7 @@ impl Calibration {
         u16::try_from(math::round_to_i64(counts).max(1)).unwrap_or(u16::MAX)
     }
 
-    /// Pressure of one count, Pa: the resolution.
+    /// Pressure difference that one count stands for, Pa.
     pub fn resolution_pa(&self) -> f64 {
         (self.p_max_bar - self.p_min_bar) / COUNTS_OF_SPAN * PA_PER_BAR
     }
@@ -177,8 +178,8 @@ impl Calibration {
     }
 }
 
-/// Values of the vehicle file that override the sensor's memory. A log that begins during a dive lacks the memory's
-/// content.
+/// Values of the vehicle file that override the sensor's memory. They are needed for a log that begins during a dive,
+/// because such a log lacks the memory's content.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Overrides {
     /// Lower limit of the pressure range, bar.

@@ -188,7 +188,7 @@ impl Transaction {
     }
 }
 
-/// Separates transactions. Each message is one transaction, and one with a bad status counts as a bad frame.
+/// Separates transactions. Each message is one transaction, and a transaction with a bad status counts as a bad frame.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Transactions;
 

@@ -36,7 +36,7 @@ pub struct Bar100Emulator {
     begun: u64,
     /// Whether the host that requests measurements is emulated, too.
     polled: bool,
-    /// Measurements requested by a real host but not yet started.
+    /// Measurements that a real host has requested and that the sensor hasn't started yet.
     waiting: Vec<Pressure>,
     calibration_told: bool,
 }

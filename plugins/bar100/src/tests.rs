@@ -97,7 +97,7 @@ fn emulated_sensor_decodes_to_the_true_pressure() {
     let setup = EmulatorSetup { start, head: None, site: Site::default(), polled: true };
     let Emulated::Depth(mut emulator) = device.emulator(&setup) else { panic!("no depth sensor") };
     let mut decoder = Bar100Decoder::new(meaning(Overrides::default()));
-    // The vehicle ascends.
+    // The pressure falls by 981 Pa/s, because the vehicle ascends by 0.1 m/s.
     let pressure_pa = |at: MonoNs| 590_000.0 - 981.0 * at.as_secs_f64();
     let (mut readings, mut due) = (Vec::new(), Vec::new());
     emulator.begin(start + DurNs::from_millis(4), &mut due);

@@ -30,7 +30,7 @@ use crate::wire::{NONE, Outcome, SampleRecord, SectionRecord};
 pub(crate) const WAITING: usize = 64;
 /// Maximum number of samples kept while the queue is full: ten seconds of four heads.
 const MOST_SAMPLES: usize = 20_000;
-/// Maximum length of wall whose samples are read from the loop's store for one message, m.
+/// Maximum length of wall for which one message replaces dropped samples, m.
 const MENDED_AT_ONCE_M: f64 = 10.0;
 /// Shortest piece of wall for which samples are read from the loop's store, m. If even this piece has too many samples,
 /// some of them are left out.
@@ -62,7 +62,7 @@ struct Followed {
     id: String,
     mount: Mount,
     is_echosounder: bool,
-    /// Number of this sensor among the heads; [`NONE`] for other sensors.
+    /// Index of this sensor among the heads; [`NONE`] for other sensors.
     head: u8,
     ping: Option<Ping>,
     hz: f64,
@@ -86,7 +86,7 @@ pub struct Collector {
     changed: BTreeSet<i64>,
     samples: Vec<SampleRecord>,
     events: Vec<Value>,
-    /// Range of chainage of the dropped samples, m.
+    /// Range of chainage whose samples the page lacks, m. They will be read from the loop's store.
     unsent_m: Option<[f64; 2]>,
     dropped: Dropped,
     skips: bool,
@@ -244,7 +244,7 @@ impl Collector {
         self.hand(Fed::Playback(state));
     }
 
-    /// Handles a seek or pause of playback. Either may have changed the loop's state.
+    /// Handles a seek or pause of playback, because either may have changed the loop's state.
     pub fn stopped(&mut self, dive: &Loop) {
         if self.played == Some(dive.now()) {
             self.send(dive);
@@ -348,7 +348,7 @@ impl Collector {
         u32::try_from(self.clock.time(at).0 / 1_000_000).unwrap_or(u32::MAX)
     }
 
-    /// Returns the number of the head with this packet source.
+    /// Returns the index of the head whose packets come from this source.
     fn head(&self, source: u64) -> u8 {
         let sensor = usize::try_from(source).ok().and_then(|source| self.sensors.get(source));
         sensor.map_or(NONE, |sensor| sensor.head)
@@ -414,7 +414,7 @@ impl Collector {
     /// Passes a message to the queue. A replay waits for room; in a live dive a full queue drops the message.
     fn hand(&self, message: Fed) {
         if self.waits {
-            // Sending fails once the page has ended. This needs no action.
+            // Sending fails once the page has ended. The failure needs no action.
             let _gone = self.to.blocking_send(message);
         } else if let Err(TrySendError::Full(_)) = self.to.try_send(message) {
             tracing::debug!("the page is behind");

@@ -11,7 +11,7 @@ const LONGEST_NAME: usize = 16;
 /// Rates at which a viewer may request states, Hz.
 const RATES_HZ: core::ops::RangeInclusive<f64> = 0.1..=5.0;
 
-/// A viewer's request, parsed but not yet validated.
+/// A viewer's request, parsed but with values that haven't been checked yet.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub(crate) enum Request {
@@ -105,7 +105,7 @@ impl Command {
     }
 }
 
-/// A command to playback.
+/// A command that controls playback.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Play {
     /// Pauses playback.
@@ -124,7 +124,7 @@ pub enum Play {
     Seek(f64),
 }
 
-/// A viewer's request, parsed and validated.
+/// A viewer's request, parsed and with valid values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Asked {
     Command(Command),

@@ -56,7 +56,7 @@ pub struct Export {
     thread: JoinHandle<Taken>,
 }
 
-/// Data of the dive that the export's thread has collected.
+/// Data of the dive, as the export's thread has collected it.
 struct Taken {
     model: Model,
     states: States,

@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::compared::ComparedJson;
 use crate::wire::{SampleRecord, SectionRecord};
 
-/// A message to the page's thread.
+/// A message from the loop's thread to the page's thread.
 #[derive(Debug)]
 pub enum Fed {
     /// New data since the previous message.

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 /// Maximum number of values kept: half an hour at one per second.
 const MOST: usize = 1800;
 
-/// History of a dive's speed, allowed speed and forecast spacing T.
+/// History of a dive's speed, of the speed that was allowed, and of the forecast spacing T.
 #[derive(Debug, Default)]
 pub struct History {
     /// Time, s; then speed, m/s, allowed speed, m/s, and forecast spacing T, m.

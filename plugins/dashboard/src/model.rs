@@ -87,7 +87,8 @@ pub struct Model {
     places: VecDeque<(u64, usize)>,
     state: Option<Box<(Box<LiveStateJson>, Beside)>>,
     state_is_new: bool,
-    /// Number of jumps after which the lists were sent. The state after a jump comes later than the jump.
+    /// Value of `jumps` when the lists of alerts and notes were last sent. They are sent with the first state after a
+    /// jump.
     listed: u32,
     playback: Option<PlaybackState>,
     new_events: Vec<Value>,
@@ -374,7 +375,7 @@ impl Model {
         self.places.get(place).map(|(_, count)| *count)
     }
 
-    /// Returns the start of the voice note with this id, seconds of dive time.
+    /// Returns the dive time at which the voice note with this id starts, seconds.
     ///
     /// Returns `None` if there is no such note, or it has no recording.
     pub(crate) fn spoken_s(&self, id: u32) -> Option<f64> {
@@ -432,7 +433,8 @@ impl Model {
         self.state.as_ref().map(|shown| shown.0.now_s)
     }
 
-    /// Returns a frame with the samples between two chainages, m, and the thinning step.
+    /// Returns a frame with the samples between two chainages, m, and the thinning step n: the frame has every n-th
+    /// sample.
     ///
     /// The frame has at most [`MOST_IN_RANGE`] samples.
     pub fn samples_frame(&self, from_m: f32, to_m: f32) -> (Vec<u8>, usize) {

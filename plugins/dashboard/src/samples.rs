@@ -4,8 +4,8 @@ use crate::wire::SampleRecord;
 
 /// Number of samples in a chunk, which then takes 1.25 MiB.
 const CHUNK: usize = 1 << 16;
-/// Maximum number of samples kept, which take 160 MB. Four heads give fewer in ten hours over 7 km. Further samples are
-/// only counted.
+/// Maximum number of samples kept, which take 160 MB. A dive of ten hours over 7 km with four heads has fewer samples.
+/// Further samples are only counted.
 pub const MOST_SAMPLES: usize = 8_000_000;
 
 /// A chunk of samples and its range of chainage.
@@ -22,7 +22,8 @@ pub struct Samples {
     chunks: Vec<Chunk>,
     kept: usize,
     visible: usize,
-    /// End time of each tick, ms, with the number of samples up to that time. Seeks need these marks.
+    /// End time of each tick, ms, with the number of samples up to that time. A seek uses these marks to find the
+    /// samples that were visible at a time.
     marks: Vec<(u32, u32)>,
     not_kept: u64,
 }

@@ -23,7 +23,7 @@ pub enum Mode {
     File,
 }
 
-/// A profiling head, as described to the page.
+/// A profiling head, as described in the first message to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct HeadSite {
     /// Sensor id.
@@ -35,7 +35,7 @@ pub struct HeadSite {
     pub hidden_deg: Vec<[f64; 2]>,
 }
 
-/// A sensor, as described to the page.
+/// A sensor, as described in the first message to the page.
 #[derive(Debug, Clone, Serialize)]
 pub struct SensorSite {
     /// Sensor id.
@@ -51,7 +51,7 @@ pub struct SensorSite {
 pub struct Site {
     /// Source of the dive's data.
     pub mode: Mode,
-    /// Name of the dive: its log or scene.
+    /// Name of the log or scene from which the dive comes.
     pub dive: String,
     /// Name of the vehicle.
     pub vehicle: String,
@@ -170,7 +170,7 @@ impl Site {
 
     /// Returns the arc length at a clock hour, looking inwards. 0 is 12 o'clock, the crown.
     fn arc_at_hour_m(&self, hour: u32) -> f64 {
-        // 9 o'clock is the left wall, and y grows to the left, hence the minus.
+        // The minus is needed because 9 o'clock is the left wall, and y grows to the left.
         let (sin, cos) = math::sin_cos(f64::from(hour) / 12.0 * TAU);
         let [y, z] = self.profile.reference();
         self.profile.arc_of([y - sin, z + cos])

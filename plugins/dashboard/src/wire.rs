@@ -21,7 +21,7 @@ const SAMPLE_BYTES: usize = 20;
 pub(crate) const NONE: u8 = 255;
 /// Number of steps into which the perimeter is divided for encoding an arc length.
 const ARC_PARTS: f64 = 65_536.0;
-/// Verdict byte of a section that is not inspected: it is open, and driving on does not change it.
+/// Verdict byte of a section that is not inspected: it is open, and stays open if the vehicle drives on.
 const NOT_INSPECTED: u8 = 4;
 
 /// A section as displayed, without the bit mask of the parts that have samples.

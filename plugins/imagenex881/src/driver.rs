@@ -2,9 +2,9 @@
 //! sequence of pings.
 //!
 //! The driver first locates the head. It then homes the head, the short way, to the program's current position, and
-//! requests each ping of the program when due. After a late or lost answer the head lags. Until it has caught up, the
-//! driver polls it as soon as it has answered. A head far off its program (power-cycled, or turned by hand) is homed
-//! again.
+//! requests each ping of the program when due. After a late or lost answer the head lags behind its program. The driver
+//! then polls the head as soon as it has answered, until the head has caught up. A head far off its program
+//! (power-cycled, or turned by hand) is homed again.
 
 use std::collections::VecDeque;
 
@@ -22,7 +22,7 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Tcp, Carrier::Serial, Carrier::Udp]
 
 /// Longest usual gap between the bytes of a return.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Part of the answer timeout that allows for the head's own processing.
+/// Part of the answer timeout that allows for the head's own processing of a command.
 const LEISURE: DurNs = DurNs::from_millis(60);
 /// Slowest sound (m/s) and slowest line (bit/s) for which the answer timeout is long enough.
 const SLOWEST_SOUND_MPS: f64 = 1300.0;
@@ -39,7 +39,8 @@ const AHEAD_PINGS: u64 = 10;
 /// divided by this value.
 const TOO_SLOW_SHARE: u64 = 8;
 
-/// Minimum number of unanswered commands, among the last 32, at which a head's lag is attributed to the line.
+/// Minimum number of unanswered commands, among the last 32, from which on the driver attributes the head's lag to the
+/// line.
 const LOSSY_FROM: u32 = 3;
 
 /// Purpose of a command to the head.
@@ -136,7 +137,7 @@ impl HeadDriver {
         self.foreign_id = None;
         self.refused = !header.status.accepted() || header.status.overrun();
         let position = u16::try_from(i32::from(header.position) % COUNTS_PER_TURN).unwrap_or(0);
-        // Without a command in flight, this is a duplicate or late answer.
+        // If no command is in flight, the received answer is a duplicate or late.
         let Some((aim, _)) = self.asked else { return };
         if let Aim::Ping(number) = aim {
             let planned = self.timetable.ping(number).map(|ping| ping.position);
@@ -186,8 +187,8 @@ impl HeadDriver {
         let from = homing::Standing { angle_rad: self.settings.sensor_rad(position), growing };
         let current = self.timetable.first_at(now);
         self.joins_at = current;
-        // The homing distance depends on the program's position on arrival. This position depends on the homing
-        // distance. Both are therefore found by iteration.
+        // The homing distance depends on the program's position when the head arrives, and this position depends on the
+        // homing distance. Both are therefore found by iteration.
         for _ in 0..3 {
             let Some(Planned { position, clockwise, .. }) = self.timetable.ping(self.joins_at).copied()
             else {

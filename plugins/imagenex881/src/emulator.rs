@@ -66,14 +66,14 @@ fn echo(tag: Tag, part: Option<f64>) -> Bytes<MAX_ECHO_BYTES> {
 pub struct HeadEmulator {
     settings: Settings,
     latency: DurNs,
-    /// Ratio of a range as measured by the head to the true range at the site.
+    /// Ratio of a range that the head reports to the true range at the site.
     device_per_site: f64,
     /// The emulated host; `None` if a real host polls.
     host: Option<Host>,
     codec: CommandCodec,
     head: Head,
     ping_at: MonoNs,
-    /// Soundings requested by a real host, not yet started.
+    /// Soundings that a real host has requested and that the head hasn't started yet.
     waiting: Vec<Sounding>,
     asked: VecDeque<Asked>,
 }

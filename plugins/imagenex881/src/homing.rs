@@ -63,7 +63,7 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
-    /// An emulated head executes the homing commands, and then the first command of its scan program.
+    /// Checks that an emulated head executes the homing commands, and then the first command of its scan program.
     #[test]
     fn homed_head_continues_with_its_scan_program() {
         for text in ["mode = \"fast\"", "mode = \"slow\"\nangle_sign = \"inverted\"\nangle_offset_deg = 40"] {

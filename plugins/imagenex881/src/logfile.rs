@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn real_sounder_log_is_read() {
-        // For each file, the number of shots, and the number of shots with an echo.
+        // For each file, the number of shots, and how many of these have an echo.
         let counts = [(300, 203), (917, 452)];
         let name = "imagenex852_cidco/19_26_51-2016_11_18-sonar.852";
         for (path, (shots, echoes)) in headrace_support::recordings::both(name, counts[0], counts[1]) {

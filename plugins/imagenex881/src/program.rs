@@ -20,7 +20,7 @@ pub struct Host {
     sector: Option<Sector>,
 }
 
-/// A sector in counts of 0.3 degrees, with the head's offset above the sector's lower end.
+/// A sector in counts of 0.3 degrees, with the head's position in the sector, counted from the lower end.
 #[derive(Debug, Clone, Copy)]
 struct Sector {
     size: i32,

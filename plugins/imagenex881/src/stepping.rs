@@ -20,7 +20,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// Creates a head at `position` (0 to 1199) that steps towards larger positions if `growing`.
+    /// Creates a head at `position` (0 to 1199) that steps towards larger positions if `growing` is set.
     pub fn new(position: i32, growing: bool) -> Self {
         Self { position: position.rem_euclid(COUNTS_PER_TURN), growing }
     }

@@ -21,7 +21,7 @@ const MICROSECOND: DurNs = DurNs(1000);
 pub enum AxisOrder {
     /// Standard order: pitch, roll, yaw; lateral, longitudinal, vertical. Figures of merit and latency are used.
     Yxz,
-    /// `OpenIMU` order: x, y, z. Its maker says to ignore the figures of merit and the latency.
+    /// `OpenIMU` order: x, y, z. The unit's maker says to ignore the figures of merit and the latency.
     Xyz,
 }
 
@@ -189,8 +189,8 @@ impl State {
             }
             M::RateOfTurn(raw) => return self.rate(scaled(raw, xsens::RATE_QUANTUM_RADPS)),
             M::Acceleration(raw) => return self.force(scaled(raw, xsens::ACCELERATION_QUANTUM_MPS2)),
-            // High-rate messages are ignored, because sources disagree about which code means rate and which means
-            // force.
+            // High-rate messages are ignored, because published sources disagree about which code means rate and which
+            // code means force.
             _ => (),
         }
         None
@@ -222,7 +222,8 @@ impl State {
     fn take_j1939(&mut self, message: &j1939::Message) -> DelayedReading {
         let order = self.meaning.axis_order;
         let (triple, reading) = match message {
-            // Pitch and roll without yaw are no full attitude. The navigation filter gets pitch and roll from gravity.
+            // Pitch and roll without yaw are no full attitude. The navigation filter can derive pitch and roll from the
+            // direction of gravity.
             j1939::Message::Slope(_) => return None,
             j1939::Message::AngularRate(triple) => {
                 let rates = triple.rates_degps().map(|degps| degps.map(f64::to_radians));
@@ -258,7 +259,7 @@ impl State {
 
     /// Handles a timestamp of an SBG unit. Only the kind of timestamp that arrived first is used.
     ///
-    /// The unit stamps samples and filter solutions with the same clock, but at different times.
+    /// The unit stamps samples and solutions of its own filter with the same clock, but at different times.
     fn sbg_stamp(&mut self, time_us: u32, of_filter: bool) {
         if *self.stamped_by_filter.get_or_insert(of_filter) == of_filter {
             self.stamp(time_us, MICROSECOND);

@@ -133,7 +133,7 @@ fn wrapped(ticks: i64) -> u32 {
     u32::try_from(ticks.rem_euclid(1 << 32)).unwrap_or_default()
 }
 
-/// Counts nearest to these values, within the range of the wire format.
+/// Counts nearest to `values`, clamped to the range of the wire format.
 fn counts<const N: usize>(values: [f64; N], quantum: f64) -> Option<[i16; N]> {
     let counts = |value| {
         let counts = math::round_to_i64(value / quantum);

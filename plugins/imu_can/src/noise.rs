@@ -10,13 +10,13 @@ const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const DEGREE_AN_HOUR: f64 = DEGREE / 3600.0;
 /// A millionth of standard gravity, m/s^2.
 const MICRO_G: f64 = 9.806_65e-6;
-/// Time constant of the bias wander, s. An Allan deviation usually has its minimum near this time. Data sheets state
-/// the in-run stability at that minimum.
+/// Time constant of the bias wander, s. The Allan deviation of a unit usually has its minimum near this time, and data
+/// sheets state the in-run stability at this minimum.
 const WANDERS_OVER_S: f64 = 300.0;
 /// Constant bias of a factory-calibrated unit after power-on, rad/s.
 ///
-/// The value is the rate that a unit at rest on deck reads. Data sheets bound the bias by the worst case of a
-/// year (0.2 degrees/s, 30 mm/s^2).
+/// It is the turn rate that a unit reads while it rests on deck. Data sheets state larger limits, which hold for the
+/// worst case of a year (0.2 degrees/s, 30 mm/s^2).
 const GYRO_TURN_ON: f64 = 0.05 * DEGREE;
 const ACCEL_TURN_ON_MPS2: f64 = 0.02;
 /// In-run instability of accelerometers, increased for mounting, temperature and resolution, m/s^2.

@@ -120,7 +120,8 @@ fn emulated(own: &str, decoder: &mut ImuDecoder, truth: &Going, samples: usize) 
     readings
 }
 
-/// Compares every reading with the unit's true motion. The tolerances of rate and force are one quantum each.
+/// Compares every reading with the unit's true motion. The tolerance of a rate or force is the size of one raw unit on
+/// the wire.
 fn check(readings: &[Decoded], truth: &Going, rate_quantum: f64, force_quantum: f64) {
     for decoded in readings {
         let felt = truth.felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
@@ -277,7 +278,7 @@ fn invalid_j1939_values_are_withheld() {
     assert_eq!((got.len(), decoder.withheld()), (2, 2));
     assert_eq!(got[0].valid_at, MonoNs(1_000_000_000 - 3_000_000 - 2_500_000));
     assert_eq!(got[1].valid_at, MonoNs(1_000_000_000 - 3_000_000));
-    // The first rate on the wire is pitch, about y.
+    // The first rate on the wire is the pitch rate, which turns about y.
     let Reading::AngularRate(rate) = got[1].reading else { panic!() };
     assert_eq!(rate, Vec3::new(0.0, 1.0_f64.to_radians(), 0.0));
 }

@@ -151,8 +151,8 @@ impl Decoder for MavlinkDecoder {
 
     /// Number of withheld readings, plus the number of the sensor's messages from other systems.
     ///
-    /// Readings are withheld if their values are invalid: angles beyond their range, non-finite numbers, a pressure not
-    /// above zero, contradictory limits.
+    /// Readings are withheld if their values are invalid: angles beyond their range, numbers that aren't finite, a
+    /// pressure that isn't above zero, or contradictory limits.
     fn withheld(&self) -> u64 {
         self.state.withheld
     }
@@ -235,7 +235,8 @@ impl State {
 
 /// Converts roll, pitch and yaw to an attitude; `None` if an angle is beyond its limits.
 ///
-/// MAVLink's angles are an intrinsic z-y-x rotation. It equals the extrinsic x-y-z rotation that [`Rot`] takes.
+/// MAVLink's angles are an intrinsic z-y-x rotation. This rotation equals the extrinsic x-y-z rotation that [`Rot`]
+/// takes.
 fn attitude(attitude: &ATTITUDE_DATA) -> Option<Reading> {
     let [roll, pitch, yaw] = to_ours([attitude.roll, attitude.pitch, attitude.yaw].map(f64::from));
     let within = |angle: f64, most: f64| angle.abs() <= most + ANGLE_TOLERANCE_RAD;

@@ -20,7 +20,8 @@ pub const CARRIERS: [Carrier; 3] = [Carrier::Udp, Carrier::Tcp, Carrier::Serial]
 
 /// Longest usual gap between the bytes of a frame. The longest frame takes 50 ms at 57,600 baud.
 const SILENCE: DurNs = DurNs::from_millis(100);
-/// Period of the heartbeats, without which routers send nothing. Source: MAVLink, heartbeat protocol, once a second.
+/// Period of the heartbeats. A MAVLink router sends nothing to a client without heartbeats. Source: MAVLink, heartbeat
+/// protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
 /// Component id of the host, an onboard computer of the vehicle.
 const COMPONENT_ID: u8 = MavComponent::MAV_COMP_ID_ONBOARD_COMPUTER as u8;
@@ -32,7 +33,7 @@ const SYSTEM_ID: u8 = 1;
 /// The driver drops messages of other systems. It also drops all messages until the accepted system is known.
 pub struct MavlinkDriver {
     cutter: Cutter<Frames, MAX_FRAME_BYTES>,
-    /// Decides which messages belong to the sensor.
+    /// Decides which of the received messages belong to the sensor.
     decoder: MavlinkDecoder,
     own_frames: u64,
     next_at: MonoNs,

@@ -31,7 +31,7 @@ pub struct AutopilotEmulator {
     meaning: DecoderSettings,
     rate_hz: f64,
     start: MonoNs,
-    /// Ratio of a distance as measured by the sensor to the true distance at the site.
+    /// Ratio of a distance that the sensor reports to the true distance at the site.
     device_per_site: f64,
     begun: u64,
     sequence: u8,

@@ -4,12 +4,12 @@
 //!   FE length sequence system component id                     payload CRC16              first version
 //!   FD length incompatible compatible sequence system component id id id payload CRC16 [signature 13]
 //! ```
-//! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used for three reasons. It doesn't
-//! report the start of a frame, which the receive time needs. It has no counters. It accepts version 1 frames of any
-//! length. Version 2 truncates trailing zeros of a payload. Signatures aren't verified, because access to the vehicle's
-//! own network is controlled elsewhere. If a frame is cut off in its signature, the bytes that follow are therefore
-//! taken as the rest of the signature.
-//! Source: MAVLink guide, "Packet Serialization" and "Message Signing".
+//! Definitions, checksum and packing come from the mavlink crate. Its reader isn't used for three reasons. The reader
+//! doesn't report the start of a frame, which is needed for the receive time. It has no counters, and it accepts
+//! version 1 frames of any length. Version 2 truncates trailing zeros of a payload. Signatures aren't verified, because
+//! access to the vehicle's own network is controlled elsewhere. If a frame is cut off in its signature, the bytes that
+//! follow are therefore taken as the rest of the signature. Source: MAVLink guide, "Packet Serialization" and "Message
+//! Signing".
 
 use headrace_sensor::codec::{Bytes, Framed, Framing, Verdict};
 use mavlink::consts::{CHECKSUM_SIZE, MAX_PAYLOAD_LEN, STX_SIZE, v1, v2};

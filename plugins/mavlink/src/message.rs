@@ -13,11 +13,11 @@ use mavlink::dialects::ardupilotmega::{
     SCALED_IMU2_DATA, SCALED_IMU3_DATA, SCALED_PRESSURE_DATA, SCALED_PRESSURE2_DATA, SCALED_PRESSURE3_DATA,
 };
 
-/// Acceleration of one count: a thousandth of standard gravity, m/s^2.
+/// Acceleration that one raw unit stands for: a thousandth of standard gravity, m/s^2.
 pub const MILLI_G_MPS2: f64 = 9.806_65e-3;
-/// Turn rate of one count: a milliradian per second, in rad/s.
+/// Turn rate that one raw unit stands for: a milliradian per second, in rad/s.
 pub const MILLIRADPS: f64 = 1e-3;
-/// Pressure of one wire unit: a hectopascal, in Pa.
+/// Pressure that one wire unit stands for: a hectopascal, in Pa.
 pub const HECTOPASCAL: f64 = 100.0;
 
 /// One supported MAVLink message.
@@ -151,7 +151,7 @@ fn read<D: MessageData, T: From<D>>(frame: &Frame) -> Option<T> {
     D::deser(frame.version, frame.payload.as_slice()).ok().map(T::from)
 }
 
-/// The IMU messages have the same fields, except for the times and RAW_IMU's unit number.
+/// Defines the IMU messages, which have the same fields except for the times and RAW_IMU's unit number.
 macro_rules! imu_messages {
     ($($data:ident: $message:ident, $time:ident: $time_type:ty = $unit_us:literal us $(, $unit:ident)?;)*) => {$(
         impl From<$data> for Imu {
@@ -184,7 +184,7 @@ imu_messages! {
     SCALED_IMU3_DATA: Scaled3, time_boot_ms: u32 = 1000 us;
 }
 
-/// The pressure messages have the same fields.
+/// Defines the pressure messages, which have the same fields.
 macro_rules! pressure_messages {
     ($($data:ident: $message:ident;)*) => {$(
         impl From<$data> for Pressure {
@@ -239,8 +239,8 @@ impl MessageData for Distance {
             signal_quality: self.quality_percent,
             ..DISTANCE_SENSOR_DATA::DEFAULT
         };
-        // The field after the orientation is the variance. Its value for "unknown" isn't zero. The orientation, even if
-        // zero, is therefore never truncated.
+        // The payload has the variance after the orientation. Its value for "unknown" isn't zero, so the orientation is
+        // never truncated, even if it is zero.
         let len = data.ser(version, payload);
         if let Some(orientation) = payload.get_mut(ORIENTATION_AT) {
             *orientation = self.orientation;

@@ -1,8 +1,8 @@
 //! The program's own MAVLink messages: heartbeats, values and texts. The program sends them as an onboard computer
 //! beside the autopilot.
 //!
-//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations attribute them to the autopilot, and an
-//! autopilot tries to avoid the obstacles.
+//! DISTANCE_SENSOR and OBSTACLE_DISTANCE are never sent. Ground stations attribute these messages to the autopilot, and
+//! an autopilot tries to avoid the obstacles in them.
 
 use mavlink::MavHeader;
 use mavlink::types::CharArray;
@@ -106,7 +106,7 @@ impl Speaker {
                 severity: gravity.into(),
                 text: CharArray::from(part),
                 id,
-                // A part has 50 bytes, and no text of this program needs 255 parts.
+                // Parts have 50 bytes, so no text of this program needs 255 parts.
                 chunk_seq: u8::try_from(number).unwrap_or(u8::MAX),
             };
             frames.push(encode(header, &said).raw_bytes().to_vec());

@@ -133,7 +133,7 @@ fn attitude_rates_and_forces_match_the_emulated_motion() {
         let mut decoder = decoder(part);
         let readings = emulated(emulator.as_mut(), &mut decoder, 50, felt);
         assert_eq!(readings.len(), 50 * each);
-        // The tolerances are two quanta for rate and force, and single precision for angles.
+        // The tolerance is two raw units for rate and force, and the rounding of single precision for angles.
         for decoded in &readings {
             let truth = felt(Inertia::due(decoded.valid_at, DurNs::ZERO));
             match decoded.reading {

@@ -43,7 +43,7 @@ pub struct PingDriver {
     /// Messages to send before the next distance request.
     to_say: VecDeque<(Asked, Vec<u8>)>,
     asked: Option<(Asked, MonoNs)>,
-    /// The setting or query that awaits an answer, and the number of times that it may still be sent.
+    /// Encoded setting or query that awaits an answer, and the number of times that the driver may still send it.
     again: Option<(Vec<u8>, u32)>,
     next_at: MonoNs,
     look_at: MonoNs,

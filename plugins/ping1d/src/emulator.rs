@@ -54,10 +54,10 @@ pub struct PingEmulator {
     codec: PingCodec,
     heard_at: MonoNs,
     pings: u32,
-    /// Time of the next ping that isn't requested by a real host. The emulated host requests it, or the device pings
+    /// Time of the next ping, if no real host requests it. The emulated host requests it, or the device pings
     /// continuously.
     ping_at: Option<MonoNs>,
-    /// Pings requested by a real host, not yet started.
+    /// Pings that a real host has requested and that the device hasn't started yet.
     waiting: Vec<Sounding>,
     /// Message ids of the answers to the pings that a real host has requested.
     asked: VecDeque<u16>,
@@ -176,7 +176,7 @@ impl Emulator<Sounding> for PingEmulator {
 
     fn hear(&mut self, at: MonoNs, bytes: &[u8], line: LineSink<'_>) {
         let mut heard = Vec::new();
-        // A truncated frame must not hide the frames that follow.
+        // After a silence, an unfinished frame is dropped, because it must not hide the frames that follow.
         if at.since(self.heard_at) > SILENCE {
             self.codec.flush(&mut |value| heard.push(value));
         }

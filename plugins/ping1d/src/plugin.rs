@@ -130,7 +130,7 @@ impl Decoder for PingDecoder {
         clock.push(codec, packet.received, packet.bytes, |received, frame| {
             let Some(frame) = Frame::parse(frame) else { return };
             let Some((distance_mm, confidence_percent)) = distance(&frame) else { return };
-            // Values above 100 per cent are undefined, so the distance is withheld.
+            // A confidence above 100 per cent is undefined, so its distance is withheld.
             let is_other = frame.source != settings.device_id;
             if is_other || confidence_percent > 100 {
                 *withheld += 1;

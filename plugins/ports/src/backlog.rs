@@ -1,24 +1,26 @@
 //! Receive times of data that were read late, in one burst.
 //!
-//! While the computer or a line stalls, a device's data wait, and then all of them are read at once. Each part belongs
-//! to the time at which it would have been read without the stall. The device's usual period gives this time, or the
-//! data are spread evenly over the stall.
+//! While the computer or a line stalls, a device's data wait, and then all of them are read at once. Each part of the
+//! data gets the time at which it would have been read without the stall. This time follows from the device's usual
+//! period, or from spreading the data evenly over the stall.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use headrace_geometry::time::{DurNs, MonoNs};
 
-/// Shortest and longest gap before a burst. Shorter gaps are ordinary jitter. After a longer one, the computer was
-/// suspended, or the data may be from any part of the gap.
+/// Shortest and longest gap before a burst. Shorter gaps are ordinary jitter. After a longer gap, the times of the data
+/// aren't known, because the computer was suspended, or because the data may be from any part of the gap.
 const SHORTEST: DurNs = DurNs::from_millis(100);
 const LONGEST: DurNs = DurNs::from_millis(8_000);
-/// A line has stalled if nothing arrives for this many usual gaps, and then several messages at once: at least
-/// `LEAST_MESSAGES`, and the share `LEAST_SHARE` of the usual number. A device that was silent comes back with one.
+/// A line has stalled if nothing arrives for this many usual gaps, and then several messages arrive at once. They must
+/// be at least `LEAST_MESSAGES`, and at least the share `LEAST_SHARE` of the usual number. A device that was only
+/// silent comes back with a single message.
 const UNUSUAL: f64 = 3.0;
 const LEAST_MESSAGES: f64 = 2.0;
 const LEAST_SHARE: f64 = 0.1;
-/// Share of the usual data from which on no data are missing. The usual period is inexact.
+/// Share of the usual number of messages from which on a burst counts as complete. It is less than 1, because the usual
+/// period is inexact.
 const COMPLETE: f64 = 0.9;
 /// Number of reads after which the usual gap is known, and number of reads over which it is averaged.
 const KNOWN_AFTER: u32 = 8;
@@ -26,11 +28,11 @@ const AVERAGED: f64 = 16.0;
 /// Longest time that a part of a byte stream spans. A frame gets the time of the part in which it begins.
 const PART: DurNs = DurNs::from_millis(5);
 
-/// Time in which other lines read their late data, once one line has.
+/// Time that other lines need to read their late data, after one line has read its own.
 const SETTLES: DurNs = DurNs::from_millis(20);
 
-/// Time at which a line last read late data. The loop waits until all lines have, because it takes waiting packets in
-/// the order of their receive times.
+/// Time at which a line last read late data. The loop then waits until all lines have read their late data, because it
+/// takes waiting packets in the order of their receive times.
 #[derive(Debug, Clone, Default)]
 pub struct LateData(Arc<AtomicU64>);
 
@@ -75,7 +77,7 @@ impl ReadTimes {
         (SHORTEST..=LONGEST).contains(&gap) && (is_late || gap.0 as f64 >= UNUSUAL * self.gap_ns)
     }
 
-    /// Takes an ordinary read of this many bytes.
+    /// Takes an ordinary read of `bytes` bytes, and updates the usual gap and size.
     pub(crate) fn take(&mut self, received: MonoNs, bytes: usize) {
         if let Some(last) = self.last {
             self.reads = self.reads.saturating_add(1);
@@ -93,8 +95,8 @@ impl ReadTimes {
 
     /// Takes all bytes that waited until `now`. Returns their times; `None` if they did not arrive late.
     ///
-    /// If the program itself was late, the read says nothing about the device. Otherwise the device may have changed its
-    /// period or its messages, so the read counts like any other.
+    /// If the program itself was late, the read says nothing about the device. If not, the device may have changed its
+    /// period or its messages, so the read counts like any other read.
     pub(crate) fn take_waiting(&mut self, now: MonoNs, bytes: usize, is_late: bool) -> Option<Spread> {
         let spread = self.spread(now, bytes, is_late);
         if is_late {
@@ -113,7 +115,7 @@ impl ReadTimes {
             return None;
         }
         // If the program was late, the system may have dropped the newest data, or the device may have waited to be
-        // asked. Then the data are from the beginning of the gap.
+        // asked. In both cases the data are from the beginning of the gap.
         let is_short = messages * self.gap_ns < COMPLETE * gap_ns;
         let step_ns = if is_late && is_short { self.gap_ns } else { gap_ns / messages.max(1.0) };
         Some(Spread { after, now, step_ns, bytes: self.bytes.max(1.0) })
@@ -121,7 +123,7 @@ impl ReadTimes {
 }
 
 impl Spread {
-    /// Receive time of a byte that follows this many other bytes of the burst.
+    /// Receive time of a byte that follows `bytes_before` other bytes of the burst.
     pub(crate) fn at(&self, bytes_before: usize) -> MonoNs {
         let since_ns = self.step_ns * (1.0 + bytes_before as f64 / self.bytes);
         (self.after + DurNs::from_secs_f64(since_ns / 1e9)).min(self.now)
@@ -219,7 +221,8 @@ mod tests {
         assert!(!times.may_be_burst(at_ms(1140), false), "less than three periods");
         assert!(!times.may_be_burst(at_ms(9001), true), "the computer was suspended");
         assert!(!ReadTimes::default().may_be_burst(at_ms(500), true), "nothing is known about the device");
-        // A device that was silent for a second comes back with one message, or for five seconds with three.
+        // A device comes back with one message after a silence of one second, or with three messages after five
+        // seconds.
         assert!(
             times.may_be_burst(at_ms(2000), false) && device().take_waiting(at_ms(2000), 10, false).is_none()
         );

@@ -11,7 +11,7 @@ use rustix::time::{ClockId, clock_gettime};
 static AHEAD_NS: AtomicU64 = AtomicU64::new(0);
 
 /// Returns the current time on the dive's clock: the host's monotonic clock, which counts from boot and is never set,
-/// plus [`set_ahead`].
+/// plus the time that was passed to [`set_ahead`].
 pub fn now() -> MonoNs {
     let time = clock_gettime(ClockId::Monotonic);
     let seconds = u64::try_from(time.tv_sec).unwrap_or(0);

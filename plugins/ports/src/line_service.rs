@@ -34,7 +34,7 @@ const LOOK: Duration = Duration::from_millis(50);
 const STANDING_PERIOD: DurNs = DurNs::from_millis(500);
 /// The reconnect backoff is reset if the line was open for at least this time and delivered a frame.
 const LONG_ENOUGH: DurNs = DurNs::from_millis(2_000);
-/// The program read a line late if a read ended this long after it was to end.
+/// A line counts as read late if the read ended at least this long after its planned end.
 const OVERSLEPT: DurNs = DurNs::from_millis(50);
 /// Maximum number of bytes that are read at once after a stall.
 const MOST_WAITING: usize = 1 << 20;
@@ -56,7 +56,7 @@ pub trait LineRecord: Send + Sync {
 
 /// A sensor on a line, which is a connection to one or several devices.
 pub struct Attached {
-    /// Sensor index, in the order of the vehicle file.
+    /// Index of the sensor, in the order of the vehicle file.
     pub source: usize,
     /// Writing end of the sensor's ring buffer.
     pub port: Port,
@@ -84,7 +84,7 @@ pub struct Common {
 /// A line, which is a connection, and the devices on it.
 pub struct LineService {
     connect: Result<Connect, ConnectError>,
-    /// Addresses of the lines that precede this one in the vehicle file.
+    /// Addresses of the lines that precede this line in the vehicle file.
     before: Vec<Connect>,
     devices: Vec<AttachedState>,
     senders: Senders,
@@ -95,7 +95,7 @@ pub struct LineService {
 }
 
 enum LineState {
-    /// The line is closed and isn't tried again before this time.
+    /// The line is closed, and no attempt to open it is made before this time.
     Closed {
         until: MonoNs,
     },
@@ -330,7 +330,8 @@ impl LineService {
         self.rest()
     }
 
-    /// Keeps the line closed for a while. Each consecutive pause is twice as long, up to a maximum.
+    /// Closes the line for a while before the next attempt. Each consecutive pause is twice as long as the previous
+    /// one, up to a maximum.
     fn rest(&mut self) -> LineState {
         tracing::debug!(backoff_s = self.pause.as_secs_f64(), "waiting before the next attempt");
         let until = self.common.host.now() + self.pause;
@@ -404,11 +405,11 @@ impl LineService {
         let is_late = late > OVERSLEPT;
         if is_late {
             for device in &mut self.devices {
-                // Devices that the program did not ask are not silent.
+                // The delay is the program's own fault, so the devices must not count as silent.
                 device.last_bytes = (device.last_bytes + late).min(now);
                 device.last_frame = (device.last_frame + late).min(now);
             }
-            // A signal may have ended the wait. Drivers must take waiting bytes before they give up an answer.
+            // A signal may have ended the wait. Drivers must take waiting bytes before they stop waiting for an answer.
             if read.is_none() {
                 read = self.read_once(open.line.as_mut(), Duration::ZERO, &mut buffer)?;
             }
@@ -416,7 +417,7 @@ impl LineService {
         let Some((received, count)) = read else { return Ok(()) };
         open.knock_at = now + KNOCK_PERIOD;
         let bytes = buffer.get(..count).unwrap_or_default();
-        // The kernel states when it received a CAN frame, also if the frame is read late.
+        // CAN frames need no correction, because the kernel states when it received each frame.
         if !self.is_on(&[Carrier::Can]) && open.times.may_be_burst(received, is_late) {
             return self.read_waiting(open, (received, bytes), is_late);
         }
@@ -424,8 +425,8 @@ impl LineService {
         self.heard(open.line.as_mut(), received, bytes)
     }
 
-    /// Reads all bytes that wait after those of a first read. If they arrived late, they get the times at which they
-    /// would have arrived.
+    /// Reads all bytes that still wait after a first read. If they arrived late, they get the times at which they would
+    /// have arrived.
     fn read_waiting(&mut self, open: &mut OpenLine, first: (MonoNs, &[u8]), is_late: bool) -> io::Result<()> {
         let line = open.line.as_mut();
         let mut parts = vec![(first.0, first.1.to_vec())];
@@ -438,7 +439,7 @@ impl LineService {
                     total += count;
                     parts.push((received, buffer.get(..count).unwrap_or_default().to_vec()));
                 }
-                // The bytes read before the connection was lost still count.
+                // Bytes that were read before the connection was lost are still used.
                 Err(error) => {
                     ended = Err(error);
                     break;
@@ -456,7 +457,7 @@ impl LineService {
         ended
     }
 
-    /// Passes late data to the drivers, a byte stream in short parts.
+    /// Passes late data to the drivers. A byte stream is passed in short parts, each with its own time.
     fn heard_late(
         &mut self,
         line: &mut dyn Line,
@@ -503,9 +504,8 @@ impl LineService {
         }
     }
 
-    /// Adds messages dropped by the carrier to the losses of the line's first device.
-    ///
-    /// The device that sent the dropped messages isn't known.
+    /// Counts messages that the system has dropped before they were read. They are counted as losses of the first
+    /// device on the line, because the device that sent them isn't known.
     fn count_dropped(&mut self, line: &mut dyn Line) {
         let dropped = line.dropped();
         if let Some(first) = self.devices.first_mut().filter(|_| dropped > 0) {
@@ -533,8 +533,8 @@ impl LineService {
 
     /// Wakes drivers that are due, unless another driver on the line awaits an answer.
     ///
-    /// Several drivers may await answers, e.g. just after the line was opened. The first of these drivers is woken all
-    /// the same, so that it can time out. Otherwise these drivers would wait for each other for ever.
+    /// Several drivers may await answers, e.g. just after the line was opened. The first of them is woken nevertheless,
+    /// so that it can time out, because otherwise these drivers wait for each other for ever.
     fn wake(&mut self, line: &mut dyn Line) -> io::Result<()> {
         for number in 0..self.devices.len() {
             let now = self.common.host.now();
@@ -551,7 +551,8 @@ impl LineService {
         Ok(())
     }
 
-    /// Calls a driver, and performs the I/O that it requests. The answer of a transaction may cause more requests.
+    /// Calls a driver, and performs the I/O that it requests. The answer to a request may cause the driver to request
+    /// more.
     fn drive(
         &mut self,
         line: &mut dyn Line,
@@ -587,7 +588,8 @@ impl LineService {
         }
     }
 
-    /// Updates the status of each device. A problem that the line itself reports overrides these statuses.
+    /// Updates the status of each device. If the line itself reports a problem, all its devices get this problem as
+    /// their status.
     fn look(&mut self, complaint: Option<&str>, now: MonoNs) {
         for device in &mut self.devices {
             let (phase, words) = device.judge(now);

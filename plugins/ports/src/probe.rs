@@ -69,5 +69,5 @@ fn ask(line: &mut dyn Line, probe: &mut dyn Probe, bytes: &mut u64) -> io::Resul
     Ok(None)
 }
 
-/// Shortest wait for bytes, since a wait of zero would mean no timeout.
+/// Shortest wait for bytes. It isn't zero, because a timeout of zero means no timeout.
 const SHORTEST: Duration = Duration::from_millis(1);

@@ -14,7 +14,7 @@ pub enum Phase {
     Closed,
     /// The line is open, but no data has arrived yet, or none within the silence timeout.
     Silent,
-    /// Bytes arrive, but they contain no valid frame.
+    /// Bytes arrive, but no valid frame can be found in them.
     Babbling,
     /// The device on the line isn't the expected one, or refuses its settings.
     Wrong,
@@ -35,7 +35,7 @@ impl Phase {
     }
 }
 
-/// Status of a device, which begins at a given time.
+/// Status of a device from a given time on.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Status {
     /// Sensor index, in the order of the vehicle file.

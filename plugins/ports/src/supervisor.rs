@@ -135,7 +135,7 @@ fn wind_up<H>(tell: impl FnOnce(), wait: impl FnOnce() -> H, drain: impl FnOnce(
     handed_back
 }
 
-/// Live feed of a loop. The threads of the lines fill the rings.
+/// Feed of a live dive: the loop takes its packets from rings that the threads of the lines fill.
 struct LiveFeed<'a> {
     ended: &'a dyn Fn() -> bool,
     late_data: &'a LateData,
@@ -205,7 +205,7 @@ mod tests {
     /// A function that ends a line as the loop does. Its arguments notify the line, wait for it, and drain its ring.
     type Ends = fn(&dyn Fn(), &mut dyn FnMut(), &mut dyn FnMut());
 
-    /// Explores a model of a line's thread, which behaves as `LineService::run`.
+    /// Explores, with loom, a model of a line's thread that behaves as `LineService::run`.
     ///
     /// The thread checks the stop flag before each step. When the thread ends, it delivers the bytes that its driver
     /// still holds.

@@ -97,7 +97,7 @@ mod tests {
         }
     }
 
-    /// A line sends a packet and wakes the loop as `LineService` does. The loop reads its ring and sleeps as
+    /// A modelled line sends packets and wakes the loop as `LineService` does. The loop reads its ring and sleeps as
     /// `LiveFeed` does.
     ///
     /// After a deadlock, values that loom checks on drop are not dropped, because that would cause a second panic.

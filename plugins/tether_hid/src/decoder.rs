@@ -28,7 +28,7 @@ pub struct Counter {
     pub counting: Counting,
     /// Counts per metre of cable; negative if the count falls as cable is paid out.
     pub counts_per_metre: f64,
-    /// Smallest change of the length that the wheel can detect, m. 0 means that it is one count.
+    /// Smallest change of the length that the wheel can detect, m. 0 means that the smallest change is one count.
     pub step_m: f64,
     /// Maximum winch speed, m/s.
     pub max_speed_mps: f64,

@@ -15,7 +15,7 @@ const PATIENCE: DurNs = DurNs::from_millis(5_000);
 /// Longest usual gap between the bytes of one text line.
 const SILENCE: DurNs = DurNs::from_millis(100);
 
-/// Driver of a HID counter.
+/// Creates a driver of a HID counter.
 pub fn reports(layout: ReportLayout) -> MessageListener {
     let judge = move |report: &[u8]| {
         let (len, wanted) = (report.len(), layout.report_bytes);
@@ -30,7 +30,7 @@ pub fn reports(layout: ReportLayout) -> MessageListener {
     MessageListener::new(Box::new(judge), PATIENCE)
 }
 
-/// Driver of a counter that sends text lines.
+/// Creates a driver of a counter that sends text lines.
 pub fn lines() -> Listener<Lines, MAX_LINE_BYTES> {
     Listener::new(Lines, SILENCE, PATIENCE)
 }

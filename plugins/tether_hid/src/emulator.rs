@@ -64,7 +64,7 @@ impl CounterSettings {
         }
     }
 
-    /// Length of cable paid out, m.
+    /// Length of cable that the counter has counted as paid out, m.
     fn length_m(&self, payout: &Payout) -> f64 {
         (payout.chainage_m - self.zero_at_m) / self.scale
     }

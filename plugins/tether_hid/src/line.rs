@@ -15,7 +15,7 @@ use headrace_sensor::geometry::math;
 /// characters for themselves.
 const PLAIN: &[u8] = b"RD,########,########,########,9999\r\n";
 const STAMPED: &[u8] = b"99RD,9999-99-99T99:99:99.999,########,########,########,9999\r\n";
-/// Maximum length of a text line, bytes.
+/// Maximum length of a text line, bytes. It is the length of the longer template.
 pub const MAX_LINE_BYTES: usize = STAMPED.len();
 
 /// Offset in a template after `RD,`. A match up to this offset is unlikely to be chance.
@@ -34,7 +34,8 @@ pub struct Decimal {
     places: u8,
 }
 
-/// Measurement time of a winch, with digits as sent. The calendar isn't checked, because readings use the receive time.
+/// Measurement time that a monitor states for a winch, with the digits as sent. The calendar isn't checked, because
+/// readings use the receive time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stamp {
     /// Winch number, 0 to 99.

@@ -40,7 +40,7 @@ enum Wire {
     Line { metres_per_unit: f64 },
 }
 
-/// Default keys for a common type of counter.
+/// Default keys for one common type of counter.
 #[derive(Clone, Copy)]
 struct Preset {
     counts_per_metre: f64,
@@ -139,8 +139,8 @@ fn hid(reeling: &CounterSettings, own: &Section<'_>) -> Result<Wire, ConfigError
     Ok(Wire::Hid { decoder: Box::new(decoder), counter, sd_m: preset.map(|preset| preset.sd_m) })
 }
 
-/// The report layout: the reference layout, changed by the keys. If a key changes the layout, the offsets of sequence,
-/// status and auxiliary value have no default.
+/// Reads the report layout, which is the reference layout as changed by the keys. If a key changes the layout, the
+/// offsets of sequence, status and auxiliary value have no default.
 fn report_layout(own: &Section<'_>) -> Result<ReportLayout, ConfigError> {
     let reference = ReportLayout::REFERENCE;
     let byte = |key, least, usual: usize| -> Result<usize, ConfigError> {

@@ -140,7 +140,7 @@ impl Width {
 }
 
 impl ReportLayout {
-    /// The layout that [`REFERENCE_DESCRIPTOR`] describes.
+    /// Layout of the reports that [`REFERENCE_DESCRIPTOR`] describes.
     pub const REFERENCE: Self = Self {
         report_id: Some(1),
         report_bytes: 11,
@@ -375,8 +375,8 @@ mod tests {
         assert_eq!(codec.counts(), CodecCounts { good_frames: 0, bad_frames: 1, skipped_bytes: 12 });
     }
 
-    /// A layout with a count of two bytes, big-endian, unsigned and without an id. It differs from the reference as
-    /// much as the keys allow.
+    /// A layout with a count of two bytes, big-endian, unsigned and without an id. It differs from the reference layout
+    /// as much as the keys of a vehicle file allow.
     const PLAIN: ReportLayout = ReportLayout {
         report_id: None,
         report_bytes: 5,

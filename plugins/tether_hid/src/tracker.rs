@@ -3,11 +3,11 @@
 //! - A counter wraps. Changes are therefore taken the short way round.
 //! - A change faster than the winch is rejected and counted. Rejected reports are compared with each other. If
 //!   [`PERSIST`] consecutive reports agree, the counter has really moved, and the reports weren't corrupt.
-//!   - If the first of these reports was near zero, the device counts from zero again. The length continues from its
-//!     latest value. The restart is recorded, because the device may have been replugged.
+//!   - If the first of the agreeing reports was near zero, the device counts from zero again. The length continues from
+//!     its latest value. The restart is recorded, because the device may have been replugged.
 //!   - Otherwise the counter's new value is accepted.
-//! - A step back to near zero is accepted at once only if the winch can cover it in a second. This holds after a
-//!   silence too.
+//! - A step back to near zero is accepted at once only if the winch can cover it in a second. This rule also applies
+//!   after a silence.
 //! - After an accepted jump, and whenever counts may have been lost, the length is uncertain. `re_zero_needed` is then
 //!   set, and stays set.
 
@@ -21,11 +21,11 @@ use crate::report::{Report, Width};
 /// Number of consecutive reports, consistent with each other, that are needed to accept a jump of the count.
 pub const PERSIST: u32 = 5;
 
-/// Time added to the interval between two reports when the change of the count is checked, s. Reports queued in the
-/// kernel arrive together, with hardly any time between them.
+/// Time added to the interval between two reports when the change of the count is checked, s. It is needed because
+/// reports that were queued in the kernel arrive together, with hardly any time between them.
 const SLACK_S: f64 = 0.1;
 
-/// Maximum time for which a replugged device has counted before its first report, s.
+/// Maximum time for which a replugged device has already counted when its first report arrives, s.
 const FRESH_S: f64 = 1.0;
 
 /// Minimum silence of a device that is unplugged and plugged in again. Source: USB 2.0, 7.1.7.3, debounce
@@ -171,7 +171,7 @@ impl CountTracker {
         self.accept(now, change)
     }
 
-    /// Handles another report that agrees with the rejected reports of a jump.
+    /// Handles another report that agrees with the rejected reports of a possible jump.
     fn agree(&mut self, before: Seen, jump: Jump, now: Seen) -> Option<i64> {
         let agreeing = jump.agreeing + 1;
         if agreeing < PERSIST {
@@ -199,12 +199,13 @@ impl CountTracker {
         Some(self.total)
     }
 
-    /// Whether the winch can have moved by `change` counts between two times.
+    /// Whether the winch can have moved the cable by `change` counts between two times.
     fn reaches(&self, from: MonoNs, to: MonoNs, change: i64) -> bool {
         self.within(to.since(from).as_secs_f64().max(0.0), change)
     }
 
-    /// Whether the winch can have moved by `change` counts in `elapsed_s`. One more count is allowed for rounding.
+    /// Whether the winch can have moved the cable by `change` counts in `elapsed_s`. One count more than the winch can
+    /// do is allowed, because counts are rounded.
     fn within(&self, elapsed_s: f64, change: i64) -> bool {
         (change as f64).abs() <= self.max_counts_per_s * (elapsed_s + SLACK_S) + 1.0
     }

@@ -16,7 +16,8 @@ use crate::report::Delivery;
 
 const POINTS: &str = "points.ply";
 const TRACK: &str = "track.csv";
-/// Names of the files that a delivery has for other programs. Those of the map are missing if no section was judged.
+/// Names of the files that a delivery has for other programs. The files of the map are missing if no section was
+/// judged.
 pub const FILES: [&str; 18] = [
     POINTS,
     TRACK,
@@ -40,7 +41,7 @@ pub const FILES: [&str; 18] = [
 /// Deviation at which the colours of map and mesh saturate, m.
 const COLOUR_LIMIT_M: f64 = 0.3;
 
-/// Points and track, written while the replay goes on. Memory does not grow with the dive.
+/// Writes points and track while the replay goes on, so the needed memory does not grow with the dive.
 pub struct Collector<'a> {
     points: PointWriter<'a, File>,
     track: TrackWriter<File>,
@@ -110,7 +111,7 @@ impl<'a> Collector<'a> {
     fn ping(&mut self, dive: &Loop, ping: &PlacedPing) {
         let (Outcome::Sample { point, arc_m }, Some(origin)) = (ping.outcome, ping.origin) else { return };
         let range_m = (point - origin).norm();
-        // The largest errors of position and of angle at this range, taken as independent.
+        // Combines the largest error of position with the largest error of angle at this range, as independent errors.
         let sd_m = |[angle_rad, position_m]: [f64; 2]| {
             (position_m * position_m + square(angle_rad * range_m)).sqrt()
         };
@@ -119,7 +120,8 @@ impl<'a> Collector<'a> {
             range_m,
             position_sd_m: self.sd.map_or(UNKNOWN_SD_M, sd_m).min(UNKNOWN_SD_M),
             clock_h: dive.mission().profile.hour(arc_m),
-            // A ping may be valid shortly before the dive's first packet was received.
+            // A ping's time of validity may be shortly before the dive's first packet was received, so the time is not
+            // negative.
             time_s: dive.view().clock().seconds(ping.valid_at).max(0.0),
             head: u8::try_from(ping.head).unwrap_or(u8::MAX),
             is_doubtful: false,
@@ -143,7 +145,7 @@ impl<'a> Collector<'a> {
         })
     }
 
-    /// Completes points and track.
+    /// Completes the files of points and track.
     ///
     /// Errors: the first error since the beginning.
     pub fn finish(mut self, folder: &Path) -> Result<(), PathError> {
@@ -164,7 +166,7 @@ fn square(value: f64) -> f64 {
     value * value
 }
 
-/// Writes all files other than points as PLY and the track, after [`Collector::finish`].
+/// Writes all files except the points as PLY and the track, after [`Collector::finish`].
 pub fn write_files(folder: &Path, info: &FileInfo, delivery: &Delivery) -> Result<(), PathError> {
     let info = &FileInfo { date: date(delivery), id: id(delivery), ..info.clone() };
     let encode = |name: &str, encode: &dyn Fn(&mut File) -> Result<u64, FileError>| {

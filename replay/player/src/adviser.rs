@@ -1,5 +1,5 @@
-//! Simulates dives whose pilot follows the advice of a loop. This loop runs only during the simulation. The recorded
-//! dive is later run through a loop of its own.
+//! Simulates dives whose pilot follows the advice of a loop. The loop that gives the advice runs only during the
+//! simulation. The recorded dive is later run through a loop of its own.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::feed::work_off;
@@ -54,7 +54,7 @@ pub fn simulation_believing(
 
 struct LoopAdviser {
     dive: Loop,
-    /// Ports of the loop, by source number; `None` if a port is in use elsewhere.
+    /// Writing ends of the loop's packet rings, by source number; `None` if a ring is in use elsewhere.
     ports: Vec<Option<Port>>,
     /// End of the current tick of the loop.
     until: MonoNs,

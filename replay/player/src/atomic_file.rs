@@ -1,4 +1,4 @@
-//! Writes files atomically: a path has either the complete new file or the unchanged previous file.
+//! Writes files atomically: at any time, a path has either the complete new file or the unchanged previous file.
 //!
 //! The content is written beside the destination, synced, and then moved to the destination.
 
@@ -16,7 +16,8 @@ const READER_TRIES: u32 = 100;
 #[derive(Debug)]
 pub struct AtomicFile {
     file: BufWriter<File>,
-    /// Path of the destination, and storage of the incomplete file; `None` if the destination is written in place.
+    /// Path of the destination, and how the incomplete file is stored beside it; `None` if the destination is written
+    /// in place.
     beside: Option<(PathBuf, Beside)>,
 }
 
@@ -32,8 +33,8 @@ enum Beside {
 impl AtomicFile {
     /// Begins a file at `path`. If `path` is a link, begins a file at its target.
     ///
-    /// Pipes, terminals and devices can't be replaced, nor can files in a folder that accepts no new file. All these
-    /// are written in place.
+    /// Pipes, terminals and devices can't be replaced, nor can files in a folder that accepts no new file. Such a
+    /// destination is written in place.
     ///
     /// Errors: system errors.
     pub fn create(path: &Path) -> Result<Self> {
@@ -226,7 +227,7 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Returns the device and inode number of a file; `None` if the system has no such numbers.
+/// Returns the device number and the inode number of a file; `None` if the system has no such numbers.
 #[cfg(unix)]
 pub fn number_of(file: &Metadata) -> Option<(u64, u64)> {
     use std::os::unix::fs::MetadataExt as _;
@@ -239,7 +240,7 @@ pub fn number_of(_: &Metadata) -> Option<(u64, u64)> {
     None
 }
 
-/// Returns a temporary name beside a file. Readers of log folders ignore such names.
+/// Returns a temporary name beside a file. Programs that read a folder of logs ignore such names.
 fn name_beside(place: &Path) -> PathBuf {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let mut name = place.file_name().unwrap_or_default().to_owned();

@@ -13,7 +13,7 @@ use crate::log::{DiveLog, LogError, LogMessage, MessageKind};
 
 /// Minimum offset between two clocks, far longer than any dive. Timestamps with smaller gaps come from one clock.
 const YEAR_NS: u64 = 365 * 24 * 3600 * 1_000_000_000;
-/// Maximum number of clocks that are distinguished. Messages of further clocks count for no clock.
+/// Maximum number of clocks that are distinguished. Messages of any further clock aren't counted.
 const MAX_CLOCKS: usize = 100;
 
 /// A clock, described by the range of its timestamps. The ranges of two clocks are more than a year apart.
@@ -59,7 +59,8 @@ pub(crate) fn of(files: &[PathBuf], times: Option<(MonoNs, MonoNs)>) -> Result<O
         }
     }
     let several = clocks.len() > 1 || others > 0;
-    // If two counts are equal, the clock with the earlier timestamps wins, because a monotonic clock starts at zero.
+    // If two clocks have equally many messages, the clock with the earlier timestamps is chosen, because a monotonic
+    // clock starts at zero.
     let most = clocks.into_iter().min_by_key(|clock| (core::cmp::Reverse(clock.messages), clock.from));
     Ok(most.filter(|_| several))
 }
@@ -117,7 +118,7 @@ mod tests {
             count(&mut clocks, MonoNs(at * 3 * YEAR_NS));
         }
         assert_eq!(clocks.len(), MAX_CLOCKS);
-        // A timestamp beyond the limit on clocks doesn't extend the range of any other clock.
+        // If there are too many clocks, a timestamp of another clock doesn't extend the range of a known clock.
         assert!(!count(&mut clocks, MonoNs(YEAR_NS * 580)) && count(&mut clocks, MonoNs(8)));
         assert!(clocks.iter().all(|clock| clock.to.0 - clock.from.0 <= YEAR_NS));
     }

@@ -1,4 +1,5 @@
-//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, like port threads.
+//! Drives a loop from a log or a simulation: fills the packet rings tick by tick, as the threads of the ports do in a
+//! dive.
 
 use std::time::{Duration, Instant};
 
@@ -68,7 +69,7 @@ pub enum DriveError {
         /// Id of the source whose port is in use.
         source_id: String,
     },
-    /// The loops differ in more than their sections, so they can't share one navigation.
+    /// The loops differ in more than the length of their sections, so they can't share one navigation.
     #[error(
         "driving several loops with one navigation: loop {number}, counted from 0, has other sensors, another tunnel or layout than \
          loop 0, or adds its own processing of pings"
@@ -82,7 +83,7 @@ pub enum DriveError {
     Panicked {
         /// Task of the thread that panicked.
         what: &'static str,
-        /// Message of the thread's panic.
+        /// Text of the thread's panic.
         message: String,
     },
 }
@@ -179,7 +180,8 @@ impl Driver {
         Ok(())
     }
 
-    /// Feeds packets received before `until`. Whenever a ring is full, calls `work_off`, which runs a tick to empty it.
+    /// Feeds packets received before `until`. Whenever a ring is full, calls `work_off`, which runs a tick to empty the
+    /// ring.
     ///
     /// After an error, the packets fed so far have been processed.
     pub(crate) fn fill(
@@ -202,7 +204,8 @@ impl Driver {
     }
 }
 
-/// Takes the ports of all sensors. Also takes the port of the operator's input, unless an operator is connected.
+/// Takes the ports of all sensors. Also takes the port of the operator's input, unless an operator is already
+/// connected.
 fn take_ports(dive: &mut Loop) -> Result<Vec<Port>, DriveError> {
     let ids: Vec<String> = dive.sources().iter().map(|source| source.id.clone()).collect();
     let sensors = ids.into_iter().enumerate();
@@ -220,8 +223,8 @@ fn send_until(
     until: MonoNs,
     work_off: &mut dyn FnMut(MonoNs),
 ) -> Result<(), DriveError> {
-    // No packet can have a timestamp above the clock's largest value, so a packet with this value belongs to the last
-    // tick.
+    // No packet can have a timestamp above the clock's largest value, so a packet with that timestamp belongs to the
+    // last tick.
     let is_due = |coming: &Coming| coming.at < until || until == MonoNs(u64::MAX);
     while let Some(coming) = feed.coming()?.filter(is_due) {
         let Some(port) = ports.get_mut(coming.source.index()) else { continue };

@@ -71,7 +71,7 @@ pub struct EffectInfluence {
     pub all_ns: Mean,
     /// Results of leaving out each effect alone, the most expensive effect first.
     pub each: Vec<LeftOut>,
-    /// The effects that can all be left out together, because the change stays within the limits.
+    /// The effects that can all be left out together, because the change of the results then stays within the limits.
     pub spared: LeftOut,
 }
 
@@ -84,7 +84,7 @@ impl LeftOut {
         self.excess() <= 1.0
     }
 
-    /// Returns the largest change within the two confidence intervals, as a multiple of the limit for that quantity.
+    /// Returns the largest change that the two confidence intervals allow, as a multiple of the limit for its quantity.
     fn excess(&self) -> f64 {
         (self.hole_m.farthest() / HOLE_LIMIT_M).max(self.passed.farthest() / PASSED_LIMIT)
     }
@@ -103,8 +103,8 @@ pub fn measure(
         return Err(EffectInfluenceError::Seeds(scenes.len()));
     }
     let effects = scenes.first().map(Scene::simulated).unwrap_or_default();
-    // One measurement leaves out all negligible effects together. Each effect that must be restored takes one more
-    // measurement.
+    // One measurement leaves out all negligible effects together. Each effect that must be restored because it isn't
+    // negligible takes one more measurement.
     let most = scenes.len() * (2 * effects.len() + 2);
     let mut paired = Paired { with: Vec::new(), scenes, dived: 0, most, note };
     paired.with = paired.dive(&[])?;
@@ -134,7 +134,7 @@ fn first(scenes: &mut [Scene]) -> Result<&mut Scene, EffectInfluenceError> {
 /// Simulates the same dives with and without effects.
 struct Paired<'a> {
     scenes: &'a mut [Scene],
-    /// Results of the dives with all effects, one dive per seed.
+    /// Results of the dives that are simulated with all effects, one dive per seed.
     with: Vec<Figures>,
     dived: usize,
     most: usize,
@@ -229,7 +229,7 @@ impl Figures {
     }
 
     /// Returns by how much the hole diameter D exceeds that of `other`, as a mean over the sections that both dives
-    /// have, m. Zero without such sections.
+    /// have, m. The mean is zero if they have no section in common.
     fn hole_more_than_m(&self, other: &Self) -> f64 {
         let both = self.holes_m.iter().filter_map(|(at, hole_m)| Some(hole_m - other.holes_m.get(at)?));
         let differences: Vec<f64> = both.collect();
@@ -237,7 +237,8 @@ impl Figures {
     }
 }
 
-/// Number of rounds. Each round simulates the scene once. A comparison simulates it once more, without the effects.
+/// Number of rounds. Each round simulates the scene once. If the cost of effects is measured, each round simulates the
+/// scene a second time, without the effects.
 const ROUNDS: usize = 5;
 
 /// Returns the cost of simulating with all effects, ns of processor time per sonar return.
@@ -314,7 +315,7 @@ impl Mean {
         Self { mean, half }
     }
 
-    /// Returns the absolute value of the interval's end that is farther from zero.
+    /// Returns the magnitude of the interval's end that is farther from zero.
     fn farthest(&self) -> f64 {
         self.mean.abs() + self.half
     }

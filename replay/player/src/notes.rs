@@ -30,7 +30,7 @@ pub struct LoggedNotes {
     pub losses: Vec<String>,
     /// Clock of the dive.
     pub clock: DiveClock,
-    /// Metadata of the log.
+    /// Metadata of the log from which the notes were read.
     pub metadata: BTreeMap<String, String>,
 }
 

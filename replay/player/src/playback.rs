@@ -16,7 +16,7 @@ use crate::snapshot_store::SnapshotStore;
 /// Name of a snapshot's first part, which holds the player's position in the log. The loop's state follows.
 const PLACE_PART: &str = "place in the log";
 
-/// A command to playback. Commands are executed in order.
+/// A command that controls playback. Commands are executed in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum PlaybackCommand {
     /// Pauses between two ticks.
@@ -57,7 +57,7 @@ pub trait PlaybackObserver {
     /// Called after each tick that is played.
     fn after_tick(&mut self, dive: &Loop);
 
-    /// Called after each tick that a jump skips. Notices of a skipped tick must not be displayed.
+    /// Called after each tick that a jump skips. The results of a skipped tick must not be displayed.
     fn after_skipped_tick(&mut self, dive: &Loop);
 
     /// Called when playback pauses, after a jump, and at the end of the log. `ended` is true only at the end of the
@@ -146,7 +146,8 @@ impl<'a> Playback<'a> {
             let due = self.driver.due(self.player)?;
             let command = match due {
                 None => {
-                    // At the log's end, remaining steps are discarded, so that a later jump back doesn't run them.
+                    // At the log's end, the steps that are still to be run are discarded, so that a later jump back
+                    // doesn't run them.
                     if let Mode::Stepping(_) | Mode::SteppingSection = self.mode {
                         self.mode = Mode::Paused;
                     }
@@ -180,8 +181,8 @@ impl<'a> Playback<'a> {
                 command
             }
             Mode::Stepping(_) => None,
-            // Only checks for a command and doesn't wait. The next judged section may be far away, so commands must be
-            // able to interrupt.
+            // Checks for a command without waiting. The next section whose verdict is settled may be far away, so a
+            // command must be able to end the search for it.
             Mode::SteppingSection => commands.try_recv().ok(),
             Mode::Playing => match self.clock.left(until) {
                 None => commands.try_recv().ok(),

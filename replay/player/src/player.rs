@@ -36,7 +36,7 @@ pub struct Player {
     is_started: bool,
     /// Messages with timestamps of another clock, by source id: count and first timestamp.
     astray: BTreeMap<String, (u64, MonoNs)>,
-    /// The farthest position that playback had reached before a jump, as a message count, and the losses up to it.
+    /// The farthest position that playback has reached, as a number of messages, and the losses up to that position.
     farthest: (u64, Vec<String>),
 }
 
@@ -84,8 +84,8 @@ impl Player {
         self.reader.header()
     }
 
-    /// Maps the log's sources to the loop's sources by name. The number of the operator's input follows those of the
-    /// sensors.
+    /// Maps the log's sources to the loop's sources by name. The number of the operator's input follows the numbers of
+    /// the sensors.
     ///
     /// Before this call, no message of the log has a source in the loop.
     pub fn connect(&mut self, sources: &[SourceInfo]) {
@@ -153,7 +153,7 @@ impl Player {
         self.played
     }
 
-    /// Returns losses and omissions so far, as text, including those found before a jump back.
+    /// Returns losses and omissions so far, as text, including losses that were found before a jump back.
     pub fn losses(&self) -> Vec<String> {
         let (order, losses) = &self.farthest;
         if *order > self.order { losses.clone() } else { self.losses_here() }
@@ -226,7 +226,8 @@ impl Player {
                 continue;
             }
             if !self.is_started && self.ids.get(index).is_none_or(|id| id != CONSOLE_ID) {
-                // The log may begin with a sensor that the vehicle file doesn't have.
+                // The dive's clock starts only with a sensor of the vehicle file. The log may begin with another
+                // sensor.
                 (self.dive_clock, self.is_started) = (DiveClock::new(Some(message.log_time)).into(), true);
             }
             self.bytes.clear();

@@ -122,7 +122,7 @@ impl Rebuild {
         MonoNs(self.progress.at_ns.load(Ordering::Relaxed))
     }
 
-    /// Whether [`Rebuild::finish`] takes only a fraction of a second, or the thread has ended early.
+    /// Whether [`Rebuild::finish`] would take only a fraction of a second, or the thread has ended early.
     pub fn is_near(&self) -> bool {
         let behind = self.sent.saturating_sub(self.progress.taken.load(Ordering::Relaxed));
         self.thread.is_finished() || self.progress.read.load(Ordering::Relaxed) && behind <= NEAR_PACKETS
@@ -143,7 +143,7 @@ impl Rebuild {
     }
 }
 
-/// The packets of a log, followed by new packets.
+/// Feed with the packets of a log, followed by new packets.
 struct Rejoined {
     player: Player,
     live: Receiver<Packet>,

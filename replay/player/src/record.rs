@@ -14,13 +14,14 @@ use crate::log::format::{HEAD_WORDS, RESULT_PREFIX, STREAMS};
 use crate::log::{RecorderPort, ResultChannel};
 use crate::view;
 
-/// Free bytes that the largest tick needs in the recorder's queue, for packets, their headers, and the list of their
-/// sources.
+/// Number of free bytes that the largest tick needs in the recorder's queue, for packets, their headers, and the list
+/// of their sources.
 const LARGEST_TICK_BYTES: usize = MAX_TICK_BYTES + MAX_TICK_PACKETS * 64 + 4096;
 
 /// In a dive that reads ports, a tick may consume at most the free room of the queue divided by this number.
 ///
-/// The limit is strict because short packets, with their results, take several times their length in the queue.
+/// The limit is that strict because short packets, together with their results, take several times their own length in
+/// the queue.
 const SMALLER_TICK: usize = 8;
 /// Minimum limit for a tick in a dive that reads ports, bytes. The longest packet of a port has some KiB.
 const MIN_TICK_BYTES: usize = 8 * 1024;
@@ -133,12 +134,12 @@ impl Outlet for Recording {
         let (count, bytes) = packets.fold((0, 0), |(count, sum), bytes| (count + 1, sum + bytes));
         let needed = bytes + RecorderPort::tick_entry_bytes(count);
         for port in ports.iter_mut().filter(|port| !port.is_closed()) {
-            // A recorder that skips ticks resumes only once there is ample room, even if a small tick would fit
-            // earlier.
+            // A recorder that has skipped ticks resumes only when a quarter of its queue is free, even if a small tick
+            // fits earlier.
             let needed = if port.is_behind() { needed.max(port.capacity_bytes() / 4) } else { needed };
             if count > 0 && port.vacant_bytes() < needed {
-                // Ticks are skipped only in a dive that reads ports. In any other dive, the loop's allowance has
-                // reserved the room.
+                // Ticks are skipped only in a dive that reads ports. In any other dive, the loop takes only as many
+                // packets as there is room for.
                 port.skip(time.now, count as u64);
                 continue;
             }
@@ -181,7 +182,8 @@ fn record_tick(port: &mut RecorderPort, inbox: &Inbox, time: &TickTime, order: &
 
 /// Records the results of a tick.
 ///
-/// Packets have priority, so results that don't fit are left out. Gaps in the record numbers show such omissions.
+/// Packets have priority, so results that don't fit are left out. Gaps in the numbers of the records show where results
+/// were left out.
 fn record_results(
     port: &mut RecorderPort,
     streams: &[(&str, &ResultStream)],

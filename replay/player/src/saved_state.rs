@@ -27,7 +27,7 @@ const PIECE_BYTES: usize = 1 << 20;
 /// Maximum size of a state, bytes.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// Number and digest of packets, in the order in which the loop consumed them.
+/// Number of packets that a loop has consumed, and their digest in the order of consumption.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Consumed {
     /// Number of packets.
@@ -36,14 +36,14 @@ pub struct Consumed {
 }
 
 impl Consumed {
-    /// Adds a packet.
+    /// Adds a packet to the number and the digest.
     pub fn add(&mut self, source: SourceId, received: MonoNs, bytes: &[u8]) {
         self.packets += 1;
         let head = xxh64(&u64::from(source.0).to_le_bytes(), self.digest);
         self.digest = xxh64(bytes, xxh64(&received.0.to_le_bytes(), head));
     }
 
-    /// Adds the packets of a tick.
+    /// Adds the packets of a tick to the number and the digest.
     pub fn add_tick(&mut self, inbox: &Inbox) {
         inbox.iter().for_each(|(source, packet)| self.add(source, packet.received, packet.bytes));
     }
@@ -54,12 +54,12 @@ impl Consumed {
 pub struct SavedState {
     /// Packets that led to the state.
     pub consumed: Consumed,
-    /// Snapshot of the loop.
+    /// Snapshot of the loop in this state.
     pub snapshot: Vec<u8>,
 }
 
 impl SavedState {
-    /// Returns the path of the state for a recording.
+    /// Returns the path at which the state for a recording is saved.
     pub fn path(recording: &Path) -> PathBuf {
         let name = recording.file_name().unwrap_or_default().to_string_lossy();
         recording.with_file_name(format!("{name}.state"))
@@ -129,7 +129,7 @@ pub struct StateKeeper {
     consumed: Consumed,
     /// Time at which the next state is to be saved.
     due: Option<MonoNs>,
-    /// A state, and its time. It is written once all its packets are on the medium.
+    /// A state, and its time. The state is written once all its packets are on the recording's medium.
     waiting: Option<(MonoNs, SavedState)>,
     states: Sender<SavedState>,
     ended: Arc<AtomicBool>,

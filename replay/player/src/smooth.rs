@@ -1,7 +1,7 @@
 //! Smooths a dive in two replays.
 //!
-//! During the first replay the steps of the navigation filter are stored on disk, because they don't fit in memory. The
-//! steps are then smoothed backwards, and the second replay uses the result. The file is unlinked, so it disappears
+//! During the first replay, the steps of the navigation filter are stored in a file, because they don't fit in memory.
+//! The steps are then smoothed backwards, and the second replay uses the result. The file is unlinked, so it disappears
 //! with the process.
 
 use std::fs::{File, OpenOptions};

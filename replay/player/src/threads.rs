@@ -25,8 +25,8 @@ pub const MOST_THREADS: usize = 3;
 const BATCH_TICKS: usize = 32;
 /// Maximum number of batches of ticks that wait in the queue between two threads.
 const MOST_WAITING: usize = 4;
-/// Capacity of the queue of used batches. It has room for the batches of two queues, and for the batches being
-/// processed.
+/// Capacity of the queue that returns used batches for reuse. It has room for the batches of two queues, and for the
+/// batches being processed.
 const MOST_UNUSED: usize = 2 * MOST_WAITING + MOST_THREADS;
 
 /// A tick, with its georeferenced pings and its speed advice.
@@ -133,7 +133,7 @@ fn drive_parts(
             for tick in batch.ticks.iter_mut().take(batch.len) {
                 run_tick(dive, tick, after_tick);
             }
-            // An error means that the placing thread has ended and needs no batches.
+            // An error means that the thread that georeferences pings has ended and needs no batches.
             used.try_send(batch).ok();
         }
         beside.map_or(Ok(()), |beside| joined(beside, "advises"))?;
@@ -252,8 +252,8 @@ fn drive_all(
             covering.push(scope.spawn(move || {
                 for batch in placed {
                     survey_all(&mut some, &batch);
-                    // The loop that finishes last returns the batch. An error means that the placing thread has ended
-                    // and needs no batches.
+                    // The loop that finishes last returns the batch. An error means that the thread that georeferences
+                    // pings has ended and needs no batches.
                     if let Some(batch) = Arc::into_inner(batch) {
                         used.try_send(batch).ok();
                     }

@@ -14,7 +14,7 @@ use crate::log::{DiveLog, LogError, MessageKind};
 /// With an intact log, the live results are only one tick ahead of the replay.
 const MOST_WAITING: usize = 16 << 20;
 
-/// Streams of results that logs of earlier versions don't have.
+/// Result streams that logs of earlier program versions don't have.
 const LATER: [&str; 2] = ["states", "alerts"];
 
 /// The first difference between a live dive and its replay.
@@ -77,7 +77,7 @@ struct Stream {
     waiting: VecDeque<Batch>,
     /// Memory of the live results that wait for the replay, bytes.
     waiting_bytes: usize,
-    /// Number of the replay's next record in this stream.
+    /// Number that the replay's next record has in this stream.
     next: u64,
     same: u64,
     unrecorded: u64,
@@ -104,7 +104,7 @@ impl Batch {
 }
 
 impl Stream {
-    /// Returns the live record with the number of the replay's next record, if it is at the front of the queue.
+    /// Returns the live record at the front of the queue, if it has the number of the replay's next record.
     fn front(&self) -> Option<(u64, Record<'_>)> {
         let batch = self.waiting.front().filter(|batch| batch.next == self.next)?;
         first_record(batch.rest()).map(|(record, _)| (batch.tick, record))
@@ -129,8 +129,8 @@ impl Stream {
         }
     }
 
-    /// Adds the live results of a tick. If too many of them wait, the replay doesn't have these records, and a
-    /// difference is reported.
+    /// Adds the live results of a tick. If too many live results wait, the replay evidently doesn't have these records,
+    /// so a difference is reported.
     fn wait(&mut self, batch: Batch, name: &'static str) {
         // After the first difference in a stream, the rest of the stream isn't compared.
         if self.difference.is_some() {

@@ -14,20 +14,20 @@ use crate::random::Stream;
 use crate::sensing::{Mounted, Scenery};
 use crate::stages::Stage;
 
-/// Systems, components and random streams that one effect adds to a simulation. They are shown to users.
+/// Systems, components and random streams that one effect adds to a simulation. The lists are shown to users.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Added {
     /// Name of the effect, as used in scenes.
     pub effect: &'static str,
     /// Systems that the effect adds, each with its stage.
     pub systems: Vec<(Stage, String)>,
-    /// Names of the base systems that the effect replaces.
+    /// Names of the base systems (the systems without effects) that the effect replaces.
     pub replaces: Vec<&'static str>,
     /// Components that the effect adds, each with the ids of the sensors that get the component.
     pub components: Vec<(String, Vec<String>)>,
     /// Sources for which the effect draws random numbers during the dive.
     pub streams: Vec<String>,
-    /// Text about the effect's change to the vehicle's trajectory; `None` if it changes nothing.
+    /// Text about the effect's change to the vehicle's trajectory; `None` if the effect doesn't change it.
     pub trajectory: Option<String>,
 }
 
@@ -42,12 +42,12 @@ pub struct Programs<'a> {
     pub(crate) facts: &'a mut Facts,
     pub(crate) seed: u64,
     pub(crate) effect: &'static str,
-    /// Effects that drew random numbers before the dive, each paired with the id of the sensor that it drew them for.
+    /// Effects that drew random numbers before the dive, each with the id of the sensor for which it drew them.
     pub(crate) drawn: &'a mut Vec<(&'static str, String)>,
 }
 
 impl Programs<'_> {
-    /// Random stream of the current effect for a sensor.
+    /// Stream of random numbers of the current effect for a sensor.
     pub fn stream(&mut self, source: usize) -> Stream {
         let id = self.facts.sensors.get(source).map_or_else(String::new, |sensor| sensor.id.clone());
         let stream = Stream::new(self.seed, self.effect, &id);
@@ -95,13 +95,13 @@ impl<'a> Builder<'a> {
         self.facts
     }
 
-    /// Random stream of the current effect for a sensor.
+    /// Stream of random numbers of the current effect for a sensor.
     pub fn stream(&mut self, source: usize) -> Stream {
         let id = self.facts.sensors.get(source).map_or("", |sensor| sensor.id.as_str());
         self.stream_for(id)
     }
 
-    /// Random stream of the current effect for a source that isn't a sensor.
+    /// Stream of random numbers of the current effect for a source that isn't a sensor.
     pub fn stream_for(&mut self, what: &str) -> Stream {
         let seed = self.seed;
         let effect = self.now().map_or("", |now| {
@@ -160,7 +160,7 @@ impl<'a> Builder<'a> {
         self.world.get_resource_mut::<Scenery>()
     }
 
-    /// Duration of the dive, s, on the trajectory that the effects built so far have left.
+    /// Duration of the dive, s, on the trajectory as changed by the effects built so far.
     pub fn duration_s(&self) -> f64 {
         self.world.get_resource::<Scenery>().map_or(0.0, |scenery| scenery.trajectory.duration_s())
     }
@@ -177,13 +177,13 @@ impl<'a> Builder<'a> {
         self.added.iter().any(|added| added.replaces.contains(&base))
     }
 
-    /// Begins the effect named `effect`. Systems and components added from now on belong to this effect.
+    /// Begins the effect named `effect`. Systems and components that are added from here on belong to this effect.
     pub(crate) fn effect(&mut self, effect: &'static str) {
         self.current = Some(self.added.len());
         self.added.push(Added { effect, ..Added::default() });
     }
 
-    /// Begins the base systems. Systems added from now on belong to no effect.
+    /// Begins the base systems. Systems that are added from here on belong to no effect.
     pub(crate) fn base(&mut self) {
         self.current = None;
     }

@@ -15,7 +15,7 @@ pub enum SceneError {
          through {what}"
     )]
     Blocked {
-        /// Time after the start at which the vehicle meets the obstacle, s.
+        /// Time at which the vehicle meets the obstacle, counted from the dive's start, s.
         after_s: f64,
         /// Chainage of the vehicle when it meets the obstacle, m.
         chainage_m: f64,

@@ -7,7 +7,7 @@ use headrace_vehicle::VehicleConfig;
 
 use crate::trajectory::Ground;
 
-/// Facts about vehicle and tunnel that effects are checked against.
+/// Facts about vehicle and tunnel. The effects of a scene are checked against them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
     /// The sensors, in the order of the vehicle file.

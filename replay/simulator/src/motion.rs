@@ -48,7 +48,7 @@ fn rate(before: Rot<Level, Sensor>, after: Rot<Level, Sensor>, elapsed: DurNs) -
     if elapsed_s <= 0.0 {
         return Vec3::zero();
     }
-    // `sine` is that of half the angle. For small angles, the ratio of the angle to it tends to two.
+    // `sine` is the sine of half the angle. For small angles, the ratio of angle to sine tends to two.
     let angle_per_sine = if sine > 1e-9 { 2.0 * math::atan2(sine, w.abs()) / sine } else { 2.0 };
     axis.scaled(angle_per_sine / elapsed_s)
 }

@@ -1,4 +1,5 @@
-//! Finds the changes that each effect makes to each measurement, by comparing it before and after each system.
+//! Finds the changes that each effect makes to each measurement, by comparing the measurement before and after each
+//! system.
 //!
 //! Effects need not report their changes. This module is only active in a simulation with ground truth.
 
@@ -117,7 +118,7 @@ impl<M: Measurement> Default for Before<M> {
     }
 }
 
-/// The effect whose system has just run; `None` if it was a base system, whose output is the original measurement.
+/// The effect whose system has just run. `None` stands for a base system, whose output is the original measurement.
 #[derive(Debug, Clone, Copy)]
 struct After(Option<u16>);
 

@@ -29,9 +29,9 @@ pub(crate) struct Outbox {
     lanes: Vec<Lane>,
     /// For each source, the time at which its next message is due; `NEVER` if none waits.
     due: Vec<MonoNs>,
-    /// Messages with timestamps before this time are released.
+    /// Messages with timestamps before this time are released, which means that no earlier message can still come.
     until: MonoNs,
-    /// The source with the next released message, as an index of `lanes`.
+    /// Index in `lanes` of the source with the next released message.
     front: Option<usize>,
 }
 
@@ -49,13 +49,14 @@ impl Lane {
         self.line.messages.get(self.next).map_or(NEVER, |message| message.at)
     }
 
-    /// Takes over the messages of a time slice. Messages of earlier slices that still wait stay in front of them.
+    /// Takes over the messages of a time slice. Messages of earlier slices that still wait stay in front of the new
+    /// ones.
     fn take(&mut self, line: &mut Line) {
         std::mem::swap(&mut self.line, line);
         self.line.put_first(line, self.next);
         self.next = 0;
         line.clear();
-        // Drops messages that have lost all their bytes.
+        // Messages that have lost all their bytes are dropped.
         self.line.messages.retain(|message| message.bytes.0 < message.bytes.1);
         // The next request may cross the line before the reply to the previous request, so the messages need sorting.
         if !self.line.messages.is_sorted_by_key(|message| message.at) {
@@ -113,7 +114,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Releases all messages. Returns false if all were released before.
+    /// Releases all messages. Returns false if all had been released already.
     pub(crate) fn finish(&mut self) -> bool {
         let more = self.until < NEVER;
         self.release(NEVER);
@@ -129,7 +130,7 @@ impl Outbox {
         self.look();
     }
 
-    /// Updates the times at which messages are due, and finds the source with the next released message.
+    /// Updates the times at which messages are due, and finds the source whose released message is next.
     fn look(&mut self) {
         for (due, lane) in self.due.iter_mut().zip(&self.lanes) {
             *due = lane.due();

@@ -81,8 +81,8 @@ fn navigated(scene: &Scene, settings: &Settings) -> Result<FilterNavigation, Sce
     Ok(navigation)
 }
 
-/// Standard deviation of a hole's diameter for each time between two passes, as pairs of time, s, and deviation, m.
-/// Each deviation is the largest one around the wall.
+/// Standard deviation of a hole's diameter for each time between two passes, as pairs of time, s, and deviation, m. For
+/// each time, the largest deviation around the wall is taken.
 fn by_time(navigation: &FilterNavigation, vehicle: &VehicleConfig, mount_sd_rad: f64) -> Vec<[f64; 2]> {
     let Some(running) = navigation.running() else { return Vec::new() };
     let profile = &vehicle.tunnel.profile;

@@ -14,7 +14,7 @@ use crate::file_loader::FileLoader;
 use crate::implied_effects::{self, Called, Choice, Described, Tables, Take};
 use crate::trajectory::{self, Ground, Trajectory};
 
-/// Maximum duration of a simulated dive, s.
+/// Maximum duration that a simulated dive may have, s.
 const LONGEST_S: f64 = 1e9;
 
 /// A parsed and checked scene.
@@ -43,8 +43,8 @@ impl Scene {
     ///
     /// `load` loads files that the scene or its vehicle file names. `seed` overrides the seed in the scene.
     ///
-    /// Errors: keys in the scene or in its vehicle file are missing, unknown or out of range (all are listed), the
-    /// trajectory leaves the tunnel, or an effect applies to nothing.
+    /// Errors: keys in the scene or in its vehicle file are missing, unknown or out of range (the error lists all of
+    /// them), the trajectory leaves the tunnel, or an effect applies to nothing.
     pub fn parse(
         document: Document<'_>,
         kinds: &[&dyn DeviceKind],

@@ -24,7 +24,7 @@ const CHECK_S: f64 = 0.5;
 pub(crate) struct Slice {
     /// Start of the time slice.
     pub from: MonoNs,
-    /// End of the time slice. The end itself belongs to the next slice.
+    /// End of the time slice. A measurement at exactly this time belongs to the next slice.
     pub until: MonoNs,
 }
 
@@ -86,7 +86,7 @@ pub(crate) struct Ray {
     pub hit: Option<Hit>,
 }
 
-/// Distance up to which the walls ahead of a sonar are computed, m. It is the sonar's range setting and a margin.
+/// Distance up to which the walls ahead of a sonar are computed, m. It is the sonar's range setting plus a margin.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub(crate) struct Reach(pub f64);
 
@@ -145,7 +145,7 @@ impl Scenery {
         self.trajectory.place(self.under_way_s(at)).chainage_m
     }
 
-    /// Time since the vehicle set out, as of time `at`, s.
+    /// Time that has passed at `at` since the vehicle started moving, s.
     fn under_way_s(&self, at: MonoNs) -> f64 {
         self.sets_out
             .map_or_else(|| at.since(START).as_secs_f64(), |out| at.since(out).as_secs_f64().max(0.0))

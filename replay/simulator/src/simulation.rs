@@ -1,8 +1,8 @@
 //! A simulated dive.
 //!
-//! An ECS world has an entity for each sensor. Base systems implement the stages from polling the devices to encoding
-//! their messages. The systems of the scene's effects run between the base systems. The schedule runs once per slice of
-//! the dive.
+//! The simulation is an ECS (entity component system): its world has an entity for each sensor. Base systems implement
+//! the stages from polling the devices to encoding their messages. The systems of the scene's effects run between the
+//! base systems. The schedule runs once per slice of the dive.
 
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::World;
@@ -34,7 +34,7 @@ const REACH_SHARE: f64 = 1.25;
 /// Largest range of an echosounder, m.
 const ECHOSOUNDER_REACH_M: f64 = 100.0;
 
-/// A time that is never reached.
+/// A time later than any time of a dive.
 const NEVER: MonoNs = MonoNs(u64::MAX);
 
 /// An on-board monitor whose advice the simulated pilot follows.
@@ -121,7 +121,8 @@ impl Simulation {
         }
         sim.base();
         if asker == Asker::Hosts {
-            // `freeze` runs after all effects on the cable counters, and before the counters encode their counts.
+            // The system `freeze` must run after all effects on the cable counters, and before the counters encode
+            // their counts.
             sim.system(Stage::Tell, stages::freeze);
         }
         add_base_systems(&mut sim);
@@ -309,7 +310,8 @@ impl Simulation {
             self.end = START + DurNs::from_secs_f64(scenery.trajectory.duration_s());
         }
         let Some(slice) = self.world.get_resource::<Slice>() else { return false };
-        // The end of a slice is excluded. One nanosecond more includes a measurement at the very end of the dive.
+        // A slice doesn't include its end. One nanosecond is added, so that the last slice includes a measurement at
+        // the very end of the dive.
         let last = self.end + DurNs(1);
         if slice.until >= last {
             return self.outbox.finish();
@@ -376,7 +378,8 @@ fn hear<M: Measurement>(world: &mut World, entity: Entity, at: MonoNs, bytes: &[
     device.0.hear(at, bytes, &mut |direction, at, bytes| line.send(at, direction, bytes, 0));
 }
 
-/// The scene's facts after effects have changed the heads' programs, and the random streams that these effects used.
+/// Facts about the scene's vehicle and tunnel, with the heads' programs as changed by effects. Also returns the random
+/// streams that these effects used.
 fn programmed(scene: &Scene) -> (Facts, Vec<(&'static str, String)>) {
     let (mut facts, mut drawn) = (scene.facts.clone(), Vec::new());
     for (kind, effect) in scene.active() {

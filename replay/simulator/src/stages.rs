@@ -13,7 +13,7 @@ use crate::sensing::{Device, Echosounder, Head, Line, Mounted, Ray, Rays, Reach,
 
 /// Name of the system [`aim_held`]. Effects use the name to replace the system.
 pub(crate) const AIM_HELD: &str = "aim_held";
-/// A head's rotation may fall short of a whole turn by this angle and still count as one, radians.
+/// Angle by which a head's rotation may fall short of a whole turn and still count as one, radians.
 const SAME_ANGLE_RAD: f64 = 1e-9;
 
 /// Order of processing in a slice. Within a stage, base systems run first, then effects in the order of
@@ -154,7 +154,7 @@ pub(crate) fn aim_echosounders(
 
 type Looking<'a> = (&'a mut Samples<Sounding>, &'a mut Rays, &'a Reach);
 
-/// Marks sonars whose rays are cast by an effect instead of the base system.
+/// Marks sonars whose rays are cast by an effect and not by the base system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Component)]
 pub(crate) struct OwnBeam;
 

@@ -133,7 +133,7 @@ impl Dive {
             assert!(usual.messages == other.messages, "slices of {slice_ms} ms: {effects}");
             assert_eq!(usual.rows.len(), other.rows.len(), "slices of {slice_ms} ms: {effects}");
             for (a, b) in usual.rows.iter().zip(&other.rows) {
-                // Results are compared as text, because NaN equals NaN only there.
+                // Results are compared as text, because in text NaN equals NaN.
                 assert_eq!(format!("{a:?}"), format!("{b:?}"), "slices of {slice_ms} ms: {effects}");
             }
         }

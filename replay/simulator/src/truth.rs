@@ -42,12 +42,13 @@ pub struct SoundingTruth {
     pub origin: Point3<Tunnel>,
     /// Direction of the beam's axis, a unit vector.
     pub direction: Vec3<Tunnel>,
-    /// True hit of the beam's axis, and the arc length at the hit, m; `None` if the beam hits nothing.
+    /// True hit of the beam's axis, and the hit's arc length on the design profile, m; `None` if the beam hits nothing.
     pub wall: Option<(Hit, f64)>,
 }
 
 impl TruthRow {
-    /// Hit of the beam's axis, and the arc length at the hit, m; `None` for a sensor other than a sonar.
+    /// Hit of the beam's axis, and the hit's arc length on the design profile, m; `None` for a sensor other than a
+    /// sonar.
     pub fn wall(&self) -> Option<(Hit, f64)> {
         self.sounding.and_then(|sounding| sounding.wall)
     }
@@ -65,7 +66,7 @@ impl SoundingTruth {
 pub struct Cause {
     /// Index of the effect in the scene's list of effects.
     pub effect: u16,
-    /// Name of the changed value, with its unit.
+    /// Name of the value that the effect changed, with its unit.
     pub what: &'static str,
     /// The value before the change; NaN if there was none.
     pub from: f64,
@@ -73,7 +74,7 @@ pub struct Cause {
     pub to: f64,
 }
 
-/// Adds the measurements of the slice to `rows`, sensor by sensor.
+/// Adds the ground truth of the slice's measurements to `rows`, sensor by sensor.
 pub(crate) fn collect(world: &mut World, entities: &[Entity], rows: &mut Vec<TruthRow>) {
     let mut notes =
         world.get_resource_mut::<Notes>().map(|mut notes| std::mem::take(&mut notes.0)).unwrap_or_default();

@@ -114,12 +114,12 @@ fn echosounders_reveal_upside_down_heads() {
     }
 }
 
-/// The zeros of cable counter, surface and water level are exact, apart from quantisation and the error of the
-/// height that the heads give.
+/// The zeros of cable counter, surface and water level are exact, except for rounding and for the error of the height
+/// that the heads measure.
 #[test]
 fn estimated_zeros_of_cable_counter_surface_and_water_level_are_exact() {
     let mut stand = Stand { noise_m: 0.0, ..Stand::new(shapes::ceran().unwrap(), &[Wrong::default(); 2], 1) };
-    // The sensor is slightly under water.
+    // With a surface 2.6 m above the floor, the depth sensor is slightly under water.
     stand.site.surface_above_floor_m = 2.6;
     stand.ask(|material| {
         let still = longest(material).unwrap();

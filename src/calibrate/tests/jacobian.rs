@@ -9,9 +9,9 @@ use headrace_fusion::filter::settings::Settings;
 const N: usize = COMMON + 2 * OWN;
 const STEP: f64 = 1e-6;
 
-/// With a narrow beam, derivatives are exact except at a wall's edges, where the two rays of a difference may
-/// hit different walls. Derivatives with respect to rotations are exact only at zero rotation, because
-/// rotations are assumed to be small.
+/// With a narrow beam, derivatives are exact except at a wall's edges. There, the two rays of a central difference may
+/// hit different walls. Derivatives with respect to rotations are exact only at zero rotation, because rotations are
+/// assumed to be small.
 #[test]
 fn every_range_derivative_matches_central_differences() {
     for (name, profile) in profiles() {

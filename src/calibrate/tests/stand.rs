@@ -20,7 +20,7 @@ const ECHOES: usize = 3;
 pub(super) const HEADS: usize = 7;
 const DEVICE_MPS: f64 = 1500.0;
 
-/// True mount of a head relative to the vehicle file: degrees about its axis, m to the left and up, and whether
+/// Difference of a head's true mount from the vehicle file: degrees about its axis, m to the left and up, and whether
 /// it is mirrored.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Wrong {
@@ -113,7 +113,7 @@ impl Stand {
     }
 
     fn uniform(&self, k: u64, salt: u64) -> f64 {
-        // Splitmix64 of a counter.
+        // The pseudorandom numbers are Splitmix64 of a counter.
         let mut z = (self.seed << 40) ^ (salt << 32) ^ k;
         for _ in 0..2 {
             z = z.wrapping_add(0x9E37_79B9_7F4A_7C15);

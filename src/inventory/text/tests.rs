@@ -25,7 +25,7 @@ impl Drop for Tree {
 
 impl Tree {
     fn new(name: &str) -> Self {
-        // Two tests may build a machine of the same name at the same time, so each gets its own folder.
+        // Two tests may build a machine of the same name at the same time, so each call gets its own folder.
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let (process, count) = (std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let tree = Self(std::env::temp_dir().join(format!("headrace-devices-{name}-{process}-{count}")));

@@ -6,7 +6,8 @@ use headrace_sampling::plan::Planner;
 
 /// Number of values of the spacing T at which a curve is computed.
 const POINTS: u32 = 200;
-/// Number of halvings of the interval in which a curve begins. The beginning is then known to far less than a pixel.
+/// Number of halvings of the interval in which a curve begins. The beginning of the curve is then known to far less
+/// than a pixel.
 const HALVINGS: u32 = 40;
 
 /// Returns a mode's curve up to the spacing `most_m`: pairs of a spacing T, m, and the largest speed that meets it,
@@ -16,7 +17,7 @@ const HALVINGS: u32 = 40;
 /// if no speed meets `most_m`.
 pub(super) fn curve(planner: &Planner, mode: usize, most_m: f64, marked_m: Option<f64>) -> Vec<[f64; 2]> {
     let Some(least_m) = least_m(planner, mode, most_m) else { return Vec::new() };
-    // Above the smallest spacing T, the speed grows with the square root of the excess of T, so points lie closer
+    // Near the smallest spacing T, the speed grows with the square root of the excess of T, so the points lie closer
     // there.
     let grid = (0..=POINTS).map(|k| {
         let share = f64::from(k) / f64::from(POINTS);
@@ -28,7 +29,7 @@ pub(super) fn curve(planner: &Planner, mode: usize, most_m: f64, marked_m: Optio
     ts_m.into_iter().filter_map(|t_m| Some([t_m, planner.v_max_mps(mode, t_m).ok()?])).collect()
 }
 
-/// Smallest spacing T that any speed meets, m. `None` if it is above `most_m`.
+/// Smallest spacing T that any speed meets, m. `None` if this T is above `most_m`.
 fn least_m(planner: &Planner, mode: usize, most_m: f64) -> Option<f64> {
     let is_met = |t_m: f64| planner.v_max_mps(mode, t_m).is_ok();
     let (mut unmet_m, mut met_m) = (0.0, most_m);

@@ -12,9 +12,9 @@ pub(super) const CIRCLE: Colour = Colour(255, 240, 190);
 const FRAME: Frame = Frame { left: 676.0, top: 92.0, right: 886.0, bottom: 302.0 };
 /// Position of the detail's caption, pixels.
 const WORDS: Px = [634.0, 348.0];
-/// Minimum distance between the markers of two samples, pixels. Closer samples share one marker.
+/// Minimum distance between the markers of two samples, pixels. Samples that are closer to each other share one marker.
 const APART_PX: f64 = 4.0;
-/// Number of samples above which single samples can't be distinguished.
+/// Number of samples in the detail above which a reader can't distinguish them.
 const MOST: usize = 450;
 /// Half the width of the detail, as a multiple of the spacing T.
 const HALF: f64 = 1.5;
@@ -59,7 +59,8 @@ fn words(canvas: &Canvas, t_m: f64) {
 }
 
 impl Detail<'_> {
-    /// Draws the heads' tracks. They are repeated on either side of the seam.
+    /// Draws the heads' tracks. The tracks are repeated on either side of the seam, where the unrolled wall begins and
+    /// ends.
     fn lines(&self, dense: bool) {
         for pass in self.laid.passes().into_iter().filter(|pass| !(dense && pass.hidden)) {
             let thin = Look { width_px: 0.8, dash: &[], ..look::of_several(pass.head) };

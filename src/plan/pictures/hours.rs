@@ -70,7 +70,7 @@ fn sought(shown: &Shown<'_>, modes: &[Mode]) -> Result<Sought, SamplingError> {
     Ok(Sought { t_m, hours: modes.iter().map(hours).collect() })
 }
 
-/// Upper ends of the chart's axes: the spacing T, m, and the hours.
+/// Upper ends of the chart's two axes: largest spacing T, m, and largest number of hours.
 fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], SamplingError> {
     let length_m = shown.planner.inspection().length_m;
     let all = || sought.hours.iter().flatten().copied();
@@ -80,7 +80,8 @@ fn ends(shown: &Shown<'_>, modes: &[Mode], sought: &Sought) -> Result<[f64; 2], 
     if most_h > 0.0 {
         return Ok([2.2 * sought.t_m, (1.15 * most_h).min(4.0 * least_h).max(1.3 * asked_h)]);
     }
-    // If no mode meets the target, the x axis extends to the largest spacing T of any mode at the speed shown.
+    // If no mode meets the target, the axis of T extends to the largest spacing T that any mode has at the speed of the
+    // charts.
     let mut reached_m = 0.0_f64;
     for mode in modes.iter().filter(|mode| !mode.blind) {
         reached_m = reached_m.max(shown.planner.t_max_m(mode.number, shown.speed_mps)?);

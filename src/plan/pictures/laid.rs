@@ -24,7 +24,7 @@ pub(super) struct Laid {
     pub(super) to_m: f64,
 }
 
-/// A piece of a head's track on the wall, which is drawn as one line.
+/// A piece of a head's track on the wall, drawn as one connected line.
 pub(super) struct Pass {
     pub(super) head: usize,
     pub(super) hidden: bool,
@@ -87,7 +87,7 @@ impl Laid {
             if here.new_sweep || here.head != before.head {
                 continue;
             }
-            // The wall between a hidden sample and its neighbour isn't sampled.
+            // The wall between a hidden sample and its neighbour isn't sampled, so no line is drawn across it.
             let hidden = here.hidden || before.hidden;
             let (from, to) = ([before.x_m, before.arc_m], [here.x_m, here.arc_m]);
             for [begin, end] in polyline::over_seam(self.perimeter_m, from, to) {
@@ -121,8 +121,8 @@ impl Laid {
 
     /// Centre and diameter, m, of the largest gap in the pattern near an arc length.
     ///
-    /// The gap is the largest circle without samples, with its centre within one turn's travel of the
-    /// vehicle.
+    /// The gap is the largest circle without samples, with its centre on a stretch as long as the vehicle's travel in
+    /// one turn.
     ///
     /// `None` without a spacing T.
     pub(super) fn emptiest(&self, arc_m: f64) -> Option<([f64; 2], f64)> {

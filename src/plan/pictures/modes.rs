@@ -14,7 +14,7 @@ pub(super) struct Mode {
     pub(super) look: Look,
     /// Largest speed that meets the target, m/s.
     pub(super) v_max_mps: Option<f64>,
-    /// Whether the mode has no spacing T at any speed, because there is a strip that no head sees.
+    /// Whether the mode has no spacing T at any speed, because no head sees some strip of the wall.
     pub(super) blind: bool,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn fastest(modes: &[Mode]) -> Option<&Mode> {
     met.max_by(|a, b| a.v_max_mps.unwrap_or(0.0).total_cmp(&b.v_max_mps.unwrap_or(0.0)))
 }
 
-/// Text about the modes in which some strip is seen by no head.
+/// Text about the modes in which no head sees some strip of the wall.
 pub(super) fn blind_words(modes: &[Mode]) -> Vec<String> {
     let blind: Vec<&str> = modes.iter().filter(|mode| mode.blind).map(|mode| mode.name.as_str()).collect();
     match blind.len() {

@@ -64,7 +64,7 @@ fn circle(chart: &Chart<'_>, centre: [f64; 2], t_m: f64) {
 /// Pieces of the heads' tracks, each with its head and its points on the sheet.
 type Ways = Vec<(usize, Vec<Px>)>;
 
-/// Draws the heads' tracks. Returns those that are visible.
+/// Draws the heads' tracks. Returns the tracks that are visible in the chart.
 fn passes(chart: &Chart<'_>, laid: &Laid, from_m: f64) -> Ways {
     let mut ways = Vec::new();
     for pass in laid.passes() {

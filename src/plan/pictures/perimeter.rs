@@ -25,7 +25,7 @@ struct Around {
     places: Vec<WallPlace>,
     /// Point with the largest sample spacing T.
     worst: Option<WallPlace>,
-    /// Sample spacing T of the plan, m.
+    /// Sample spacing T that the plan uses, m.
     counted_m: Option<f64>,
     /// Centre of the widest strip that no head sees, m.
     unseen_m: Option<f64>,
@@ -79,7 +79,7 @@ impl Around {
     }
 }
 
-/// Draws the spacing T across the widest strip that no head sees.
+/// Draws the spacing T across the widest strip that no head sees, as a marked value.
 fn across(chart: &Chart<'_>, around: &Around) {
     let Some(point) = around.across_m() else { return };
     let place = chart.px(point);

@@ -12,7 +12,7 @@ use super::modes::{self, Mode};
 use super::shown::Shown;
 
 const FRAME: Frame = Frame { left: 66.0, top: 92.0, right: 708.0, bottom: 482.0 };
-/// Number of speeds at which the spacing T is computed to find the range of the axis for T.
+/// Number of speeds at which the spacing T is computed for the upper end of the axis of T.
 const SPEEDS: u32 = 400;
 
 /// Draws the spacing T against speed for every mode, with the target and the requested speed.
@@ -62,7 +62,7 @@ fn most_m(shown: &Shown<'_>, curves: &[(&Mode, Vec<[f64; 2]>)]) -> f64 {
     let asked_m = here.zip(shown.asked_mps()).and_then(|((_, points), asked_mps)| {
         points.iter().find(|[v_mps, _]| *v_mps >= asked_mps).map(|[_, t_m]| 1.25 * t_m)
     });
-    // Without a target, the axis extends to larger spacings T, so that all modes can be compared.
+    // Without a target, the axis shows larger spacings T too, so that all modes can be compared.
     let wide = if shown.question.target_m.is_none() { 4.0 } else { 1.0 };
     let target_m = shown.question.target_m.map(|target_m| 2.6 * target_m);
     let least_m = if at_rest_m.is_finite() { 1.5 * at_rest_m } else { 0.0 };
@@ -82,7 +82,7 @@ pub(super) fn curve(shown: &Shown<'_>, mode: &Mode, most_m: f64) -> Vec<[f64; 2]
     points.into_iter().map(|[t_m, v_mps]| [v_mps, t_m]).collect()
 }
 
-/// The spacing T without position errors at each speed of the axis: speed, m/s, and T, m.
+/// Points of the curve of T without position errors, one for each speed of the axis: speed, m/s, and T, m.
 fn spacings(shown: &Shown<'_>, mode: &Mode, most_mps: f64) -> Result<Vec<[f64; 2]>, SamplingError> {
     let point = |k: u32| {
         // The spacing T is undefined at rest, so the first speed is very low.
@@ -122,7 +122,7 @@ impl Ends {
             (Some(_), None) => Some("never".to_owned()),
         };
         let Some(end) = end else {
-            // The whole curve is above the frame.
+            // The whole curve is above the chart's frame.
             let corner = [chart.frame.left, chart.frame.top];
             self.above.push(label(corner, mode, format!("{}: above", mode.name)));
             return;

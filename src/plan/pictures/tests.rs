@@ -125,7 +125,8 @@ fn pattern_chart_shows_heads_circle_and_hidden_tracks() {
     silent(&draw(inspection(ONE), FAST, 0.058, TARGET, "pattern"), &["head 1", "hidden by"]);
 }
 
-/// In the pattern, no empty circle has a diameter larger than the spacing T, and no gap is larger than the drawn one.
+/// In the pattern, no empty circle has a diameter larger than the spacing T, and no gap is larger than the circle that
+/// the chart draws.
 #[test]
 fn no_empty_circle_is_wider_than_the_spacing_t() {
     let plans = [
@@ -148,7 +149,7 @@ fn no_empty_circle_is_wider_than_the_spacing_t() {
         let worst_m = wall::unseen_m(&planner).or(wall::worst(&planner, &places).map(|place| place.arc_m));
         let shown_m = empty_m(worst_m.unwrap());
         assert!(around_m.max(shown_m) <= 1.001 * t_m, "{arguments}: {around_m} {shown_m} of {t_m}");
-        // With a steep helix the largest gap is clearly smaller than the spacing T.
+        // With a steep helix, whose turns are far apart, the largest gap is clearly smaller than the spacing T.
         assert!(shown_m > 0.75 * t_m, "{arguments}: {shown_m} of {t_m}");
         assert!(shown_m > 0.97 * around_m, "{arguments}: {shown_m} of {around_m} elsewhere");
     }
@@ -205,7 +206,7 @@ fn compare(planner: &Planner, target_m: f64, title: &str) {
     let (hours_svg, speeds_svg) = (hours(&shown).unwrap(), speeds(&shown).unwrap());
     for (mode, answer) in modes::all(&shown).unwrap().iter().zip(&answers).filter(|(mode, _)| !mode.blind) {
         let name = format!("{title}, target {target_m} m, {}", mode.name);
-        // The first curve has no point at the target, so the line between its points is compared.
+        // The first curve has no point at the target, so the line between the neighbouring points is compared.
         let most_m = 2.2 * target_m;
         let by_hours = hours::curve(&shown, mode, most_m, f64::INFINITY);
         let by_speeds = speeds::curve(&shown, mode, most_m).into_iter().map(|[v_mps, t_m]| [t_m, v_mps]);

@@ -7,8 +7,8 @@ use headrace_sampling::strips::Strips;
 /// Point on the wall with the largest sample spacing T. Among points with nearly equal T, the one nearest to
 /// the left wall is returned.
 pub(super) fn worst(planner: &Planner, places: &[WallPlace]) -> Option<WallPlace> {
-    /// Two values of T count as equal if their ratio, the smaller by the larger, is above this value. Steps across a
-    /// strip's edge make T slightly larger there than within the strip.
+    /// Two values of T count as equal if the smaller one divided by the larger one is above this value. At the edge of
+    /// a strip, T is slightly larger than within the strip, because of steps across the edge.
     const EQUAL: f64 = 0.995;
     let profile = &planner.inspection().profile;
     let [y_m, z_m] = profile.reference();

@@ -30,7 +30,7 @@ pub struct DeviceFault {
 }
 
 impl DeviceFault {
-    /// The fault that belongs to a seed, in a dive of this duration. Consecutive seeds take the senses and faults in
+    /// The fault that belongs to a seed, in a dive of `duration_s`. Consecutive seeds take the senses and faults in
     /// turn. All other values are drawn at random.
     pub fn of(seed: u64, plain: &Scene, duration_s: f64) -> Self {
         let mut draw = Draw::new(seed ^ 0xb4ea_4a6e);

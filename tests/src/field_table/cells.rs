@@ -88,8 +88,8 @@ pub enum Condition {
     /// As `DataSheet`, but the vehicle file states the true sensor noises. The file makes no allowance for rough walls,
     /// tilt or cable slack.
     Declared,
-    /// A MEMS inertial unit and cable slack, stated in the vehicle file. Also a counter with 0.5 % error, and steel
-    /// nearby.
+    /// A MEMS inertial unit and cable slack, both stated in the vehicle file. The cable counter has an error of 0.5 %,
+    /// and steel is nearby.
     Poor,
     /// Several lost returns in a row, returns from objects in front of the wall, and second echoes.
     Murk,
@@ -163,7 +163,7 @@ pub enum Driven {
     Stood,
     /// At the planned speed, after driving slowly to the start while swinging left and right.
     Swung,
-    /// At this multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
+    /// At the given multiple of the largest speed by the paper's Eq. 16, with the heads in phase for the planned speed.
     Times(f64),
     /// By a pilot who never goes back. He follows the live advice within 5 %, with a delay of 3 s.
     Advised,
@@ -191,7 +191,8 @@ pub struct Cell {
     pub condition: Condition,
     /// Chainage at which the dive starts, m.
     pub start_m: f64,
-    /// Chainage at which the vehicle is launched, m, if this isn't `start_m`. The vehicle then drives to `start_m`.
+    /// Chainage at which the vehicle is launched, m, if it differs from `start_m`. The vehicle then drives to
+    /// `start_m`.
     pub let_in_m: Option<f64>,
     /// Speed and manner of driving.
     pub driven: Driven,
@@ -205,7 +206,7 @@ pub struct CellDive {
     pub believed: Scene,
 }
 
-/// Noise and resolution of the depth sensor; Heads and echosounders have tables of their own. Source:
+/// Noise and resolution of the depth sensor. Heads and echosounders have tables of their own. Source:
 /// `replay/simulator/src/implied_effects/data_sheets.rs`.
 const DEPTH: &str = "depth_steps = {}\ndepth_noise = { noise_pa = 152 }\n";
 /// Noise and biases of the inertial units. Source: `plugins/imu_can/src/noise.rs`, and the defaults of `[navigation]`
@@ -246,14 +247,14 @@ const STANDS_S: f64 = 30.0;
 
 /// Speed of a vehicle that swings, m/s.
 const SWINGING_MPS: f64 = 0.05;
-/// Swings before a dive: number, time of each in seconds, and angle in degrees.
+/// Swings before a dive: number of swings, duration of each swing in seconds, and angle in degrees.
 const SWINGS: (u32, f64, f64) = (12, 10.0, 5.0);
 
 /// Speed of the vehicle from the launch to the start of the inspection, m/s.
 const WAY_MPS: f64 = 0.3;
 
 impl Cell {
-    /// The dive that belongs to a seed, with this length.
+    /// The dive that belongs to `seed`, with a length of `length_m`.
     pub fn dive(&self, seed: u64, length_m: f64) -> CellDive {
         let plain = self.plain(seed, length_m);
         let [planned_mps, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -269,7 +270,7 @@ impl Cell {
         self.plan_mps(&self.plain(1, 1.0).vehicle) / self.vehicle.edge_mps
     }
 
-    /// The device that is broken in the dive with this seed and length, and its fault.
+    /// The device that is broken in the dive with the seed `seed` and the length `length_m`, and its fault.
     pub fn broken(&self, seed: u64, length_m: f64) -> DeviceFault {
         let plain = self.plain(seed, length_m);
         let [_, speed_mps] = self.speeds_mps(&plain.vehicle);
@@ -298,7 +299,7 @@ impl Cell {
     }
 
     /// Navigation settings of the vehicle file that headrace reads. In most conditions they state only the slack of a
-    /// taut cable. In some they also state noises or mount errors.
+    /// taut cable. In some conditions they also state noises or mount errors.
     fn declared_navigation(&self) -> String {
         match self.condition {
             Condition::Poor => format!("{HANGS}{MEMS_TOLD}"),
@@ -308,15 +309,15 @@ impl Cell {
         }
     }
 
-    /// The vehicle file of the simulated vehicle.
+    /// The vehicle file of the simulated vehicle, which may differ from the file `declared` that headrace reads.
     fn truly(&self, declared: &str, plain: &Scene, seed: u64) -> String {
         let counts = |by: f64| {
             let count = 2000.0 * by;
             declared.replace("counts_per_metre = 2000", &format!("counts_per_metre = {count:.1}"))
         };
         match self.condition {
-            // A cable counter that reads too little keeps estimated chainages within the tunnel. One that reads too
-            // much could put them beyond its end.
+            // A cable counter that reads too little keeps estimated chainages within the tunnel. A counter that reads
+            // too much could put them beyond the tunnel's end.
             Condition::Poor => counts(0.995),
             Condition::WrongCable => counts(0.98),
             Condition::WrongMount => {
@@ -333,8 +334,8 @@ impl Cell {
         match self.driven {
             Driven::Planned | Driven::Stood | Driven::Swung => [planned_mps, planned_mps],
             Driven::Times(times) => [planned_mps, times * self.vehicle.edge_mps],
-            // A pilot who follows advice has no fixed speed. For these kinds of driving, the second value is the
-            // largest speed that he may drive.
+            // A pilot who follows advice has no fixed speed. For `Advised` and `Back`, the second value is the largest
+            // speed that the pilot may drive.
             Driven::Advised | Driven::Back => [planned_mps, 1.2 * self.vehicle.edge_mps],
         }
     }
@@ -417,7 +418,7 @@ impl Cell {
         let mut text = String::new();
         for _ in 0..math::round_to_i64(2.0 * (to_m - from_m)) {
             let [long_m, wide_m] = [draw.between(2.0, 6.0), self.aside_m(draw.between(1.0, 4.0))];
-            // No bulge begins before the tunnel's start.
+            // The limit keeps the bulge from beginning before the tunnel's start.
             let at_m = draw.between(from_m, to_m).max(0.1 + long_m / 2.0);
             let [depth_m, arc_m] = [draw.between(-most_m, most_m), self.aside_m(draw.between(0.0, 36.0))];
             writeln!(
@@ -430,8 +431,8 @@ impl Cell {
         text
     }
 
-    /// Another wall on the middle third of the dive: wider, with a ditch or with a side tunnel. Only tunnels with a
-    /// floor have ditches and side tunnels.
+    /// Another wall on the middle third of the dive: a wider wall, a wall with a ditch, or a wall with a side tunnel.
+    /// Only tunnels with a floor have ditches and side tunnels.
     fn altered(&self, seed: u64, length_m: f64) -> String {
         let mut draw = Draw::new(seed ^ 0xa17e);
         let from_m = self.start_m + length_m / 3.0;

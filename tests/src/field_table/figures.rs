@@ -161,7 +161,7 @@ impl Figures {
         if let Some(metres) = place.and_then(|place| self.verdicts_m.get_mut(place)) {
             *metres += length_m;
         }
-        // A circle that is centred on a section's boundary is part of the neighbouring section's hole. That hole must
+        // A circle that is centred on a section's boundary is part of the neighbouring section's hole. The hole must
         // not count twice.
         let is_own = section
             .report
@@ -227,7 +227,7 @@ impl Figures {
         }
     }
 
-    /// Fraction of the errors of the hole diameter D that are within this many standard deviations.
+    /// Fraction of the errors of the hole diameter D that are within `sigmas` standard deviations.
     pub fn within(&self, sigmas: f64) -> f64 {
         let within = self.errors.iter().filter(|[error_m, sd_m]| error_m.abs() <= sigmas * sd_m).count();
         within as f64 / self.errors.len() as f64

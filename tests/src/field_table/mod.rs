@@ -10,7 +10,7 @@ pub use figures::{FalsePass, Figures, KINDS_OF_SOURCES};
 
 use crate::truth;
 
-/// Figures of a cell, from dives with these seeds and this length.
+/// Figures of a cell, from dives of `length_m` with the seeds `seeds`.
 pub fn figures(cell: &Cell, seeds: impl IntoIterator<Item = u64>, length_m: f64) -> Figures {
     let mut figures = Figures::default();
     for seed in seeds {

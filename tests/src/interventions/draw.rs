@@ -11,10 +11,10 @@ use crate::random_dives::Draw;
 
 /// Chainage at which dives begin, m.
 pub(super) const START_M: f64 = 3.0;
-/// Distance that a vehicle drives beyond the far end of the dive, m. A vehicle that turns back too early stops this far
-/// before the far end.
+/// Distance that a vehicle drives beyond the far end of the dive, m. A vehicle that turns back too early stops at the
+/// same distance before the far end.
 const ON_M: f64 = 4.5;
-/// Before a pass in a rolled attitude, the vehicle rolls over this distance, m.
+/// Distance over which the vehicle rolls before a pass in a rolled attitude, m.
 const ROLLS_OVER_M: f64 = 1.0;
 
 /// Tables of the sensors that determine the vehicle's position. No part of the hull blocks their beams.
@@ -55,7 +55,7 @@ counts_per_metre = 2000
 #[expect(missing_docs, reason = "the variants name their fields")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum Injected {
-    /// The vehicle drives over a stretch at this multiple of the dive's speed.
+    /// The vehicle drives over a stretch at `factor` times the dive's speed.
     TooFast { over_m: [f64; 2], factor: f64 },
     /// A mode of the heads with coarser angular steps.
     AngularStep { mode: &'static str },
@@ -254,7 +254,7 @@ impl Drawn {
         drawn
     }
 
-    /// The same dive with other random noise. `noise` selects the noise.
+    /// The same dive with other random noise, which the number `noise` selects.
     #[must_use]
     pub fn with_noise(&self, noise: u64) -> Self {
         Self { noise: self.seed + 1_000_000 * noise, ..self.clone() }

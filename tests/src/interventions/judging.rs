@@ -7,12 +7,12 @@ use headrace_monitor::section_row::SectionRow;
 use super::draw::{Drawn, Injected, KINDS, START_M};
 use crate::scenes;
 
-/// Sections within this distance of the ends of the trajectory are ignored, m, because they always fail.
+/// Distance from the ends of the trajectory within which sections are ignored, m, because they always fail.
 const END_M: f64 = 2.0;
-/// Failed sections within this distance of each other form one stretch, m.
+/// Largest distance at which two failed sections belong to one stretch, m.
 const JOIN_M: f64 = 0.5;
 
-/// A hole whose diameter is at most this multiple of the target counts as close to the target.
+/// Largest ratio of diameter to target at which a hole counts as close to the target.
 const CLOSE: f64 = 1.05;
 
 /// Alternative sets of causes for a failed section, each set sorted. A displayed set is right if it equals one of these
@@ -45,8 +45,8 @@ impl Judged {
         self.right.contains(&self.reported)
     }
 
-    /// Whether a single cause is displayed that is nearly right. It was injected, and without it the hole exceeds the
-    /// target by at most 5 %.
+    /// Whether a single cause is displayed that is nearly right. Such a cause was injected, and without it the hole
+    /// exceeds the target by at most 5 %.
     pub fn is_close(&self, injected: &[Injected], target_m: f64) -> bool {
         let alone = injected.iter().zip(&self.without_m).find(|(cause, _)| self.reported == [cause.cause()]);
         alone.is_some_and(|(_, hole_m)| *hole_m <= CLOSE * target_m)

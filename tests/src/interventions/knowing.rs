@@ -1,5 +1,5 @@
-//! Upper bound on the fraction of causes that a program can display correctly. It comes from a reference that knows the
-//! injected causes.
+//! Upper bound on the fraction of causes that a program can display correctly. The bound comes from a reference
+//! computation that knows the injected causes.
 //!
 //! The reference simulates the same dive without each cause, but with other noise than the judged dive. Its fraction
 //! of right answers is an upper bound for any method.
@@ -11,7 +11,7 @@ use headrace_coverage::Cause;
 use super::judging::{InterventionDive, Right, hole_at_m, report, right};
 use super::matrix::Count;
 
-/// Number of noise seeds with which the reference simulates each dive.
+/// Number of noise seeds with which the reference computation simulates each dive.
 const NOISES: u64 = 3;
 
 /// Number of right answers of the reference for dives with two causes. The reference knows everything about a dive

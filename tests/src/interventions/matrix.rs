@@ -51,7 +51,7 @@ pub struct Matrix {
     /// As `pairs`, but an answer that is nearly right also counts as right: see [`super::Judged::is_close`].
     pub close_pairs: Count,
     /// Answers for stretches. An answer is right if the program displays the whole stretch as one missed stretch
-    /// (`run`) or as none.
+    /// (`run`), or displays none of it as missed.
     pub one_run: Count,
     /// Number of dives without a failed section.
     pub idle: u32,

@@ -40,7 +40,8 @@ fn mends(action: Action, injected: &Injected) -> bool {
     }
 }
 
-/// Simulates the displayed remedy of each missed stretch. Skips those in which injected causes explain no section.
+/// Simulates the displayed remedy of each missed stretch. Skips missed stretches in which injected causes explain no
+/// section.
 pub fn remedies(dive: &InterventionDive) -> Vec<Remedied> {
     let of_run = |reported: &ReturnReport| -> Vec<Judged> {
         dive.sections.iter().filter(|section| section.run == Some(reported.run)).cloned().collect()
@@ -61,7 +62,7 @@ fn remedy(dive: &InterventionDive, reported: &ReturnReport, sections: &[Judged])
     } else {
         (has(Action::Again) && !turned_back).then_some(0.0)
     };
-    // If the action "slower" has no speed, other settings of the heads are enough at the planned speed.
+    // If the action "slower" has no speed, the remedy's other settings of the heads are enough at the planned speed.
     let at_most_mps = if reported.at_most_mps > 0.0 || !has(Action::Slower) {
         reported.at_most_mps
     } else {

@@ -53,7 +53,7 @@ pub struct Cable {
     /// Error that lines return after the latest break, as an index of [`FAILURES`].
     failure: AtomicU64,
     /// Number of breaks before the latest opening, plus one; 0 before the first opening. The connection is intact if
-    /// this number exceeds `breaks`.
+    /// `opened` exceeds `breaks`.
     opened: AtomicU64,
     /// Number of unread datagrams that the machine has dropped since the last query.
     unread: AtomicU64,
@@ -169,7 +169,7 @@ impl Line for OpenCable {
         self.cable.unread.swap(0, Ordering::SeqCst)
     }
 
-    /// Writes one message to the device. As over UDP, the answer arrives as one message with its own length.
+    /// Writes one message to the device. The answer arrives later as one message, as over UDP.
     fn exchange(
         &mut self,
         write: &[u8],

@@ -24,7 +24,7 @@ enum Done {
     Created(PathBuf),
     Wrote(PathBuf, Vec<u8>),
     Synced(PathBuf),
-    /// A sync of this file failed. Data that wasn't synced before reads as zeros from then on.
+    /// A sync of this file failed. After the failure, data that wasn't synced before reads as zeros.
     Lost(PathBuf),
     Removed(PathBuf),
 }
@@ -57,14 +57,14 @@ pub struct LeftFile {
 }
 
 impl SimulatedDisk {
-    /// Creates an empty disk with these planned faults.
+    /// Creates an empty disk with the planned faults `faults`.
     pub fn new(clock: Arc<Clock>, faults: &[Window<DiskFault>], sabotage: Option<Sabotage>) -> Self {
         let (done, failed) = (Arc::new(SegQueue::new()), Arc::new(SegQueue::new()));
         let [busy_until, syncs] = [0; 2].map(|_| Arc::default());
         Self { clock, faults: faults.into(), done, busy_until, syncs, failed, sabotage }
     }
 
-    /// Time at which the last operation is complete. The caller of that operation waits until then.
+    /// Time at which the last operation is complete. The caller of the last operation waits until this time.
     pub fn busy_until(&self) -> MonoNs {
         MonoNs(self.busy_until.load(Ordering::SeqCst))
     }
@@ -99,8 +99,8 @@ impl SimulatedDisk {
     }
 
     /// Returns the files that are left on the disk after the dive. If the dive ends by a kill or a power cut,
-    /// operations that are not complete by then have no effect. After a power cut, unsynced data is also cut off or has
-    /// holes.
+    /// operations that are not complete at that moment have no effect. After a power cut, unsynced data is also cut off
+    /// or has holes.
     pub fn left(&self, ending: Ending, random: &mut Random) -> Vec<LeftFile> {
         let mut files: Vec<LeftFile> = Vec::new();
         while let Some((complete, done)) = self.done.pop() {

@@ -13,7 +13,7 @@ pub struct DiveResult {
     pub plan: Plan,
     /// Packets that the loop took during the dive, in order.
     pub consumed: Vec<Consumed>,
-    /// Positions at the advice updates, in order; after each tick, the latest.
+    /// After each tick, the position at the latest advice update.
     pub positions: Vec<Position>,
     /// Kinds of all alerts of the dive, and causes of missed stretches.
     pub alerts: Vec<&'static str>,
@@ -27,7 +27,7 @@ pub struct DiveResult {
     pub disk_failures: usize,
     /// Files of the recording that are left on the disk.
     pub left: Vec<LeftFile>,
-    /// The first `certain` consumed packets must be in the log, whichever way the dive ends.
+    /// Number of consumed packets, from the first on, that must be in the log, whichever way the dive ends.
     pub certain: usize,
     /// Whether the recorder left packets out because its queue was full.
     pub has_left_out: bool,

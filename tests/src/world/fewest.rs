@@ -1,6 +1,7 @@
 //! Reduces a failure to the fewest faults.
 
-/// Returns some of the faults that together still make a test fail. Without any single one of them, the test succeeds.
+/// Returns some of the faults. Together they still make a test fail, but if any single one of them is left out, the
+/// test succeeds.
 ///
 /// `fails` tells whether the test fails with the given faults. With all faults together it must fail.
 pub fn fewest<T: Clone>(faults: &[T], mut fails: impl FnMut(&[T]) -> bool) -> Vec<T> {

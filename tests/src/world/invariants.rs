@@ -27,8 +27,8 @@ pub fn broken(lived: &DiveResult, replayed: &Result<Replayed, String>) -> Vec<St
     broken
 }
 
-/// Whether the recorder must record everything, because nothing stalls and no disk operation fails. A disk that
-/// performs only a few operations per second is no excuse for leaving packets out.
+/// Whether the recorder must record everything, because nothing stalls and no disk operation fails. Even if the disk
+/// performs only a few operations per second, the recorder may not leave packets out.
 fn keeps_up(lived: &DiveResult) -> bool {
     let plan = &lived.plan;
     let is_limited = |what: DiskFault| matches!(what, DiskFault::OpsLimited { .. });
@@ -39,8 +39,8 @@ fn keeps_up(lived: &DiveResult) -> bool {
         && !plan.cables.iter().flatten().any(|window| is_held(window.what))
 }
 
-/// Number of packets in `theirs` that the loop never took, or took in another order. `ours` are the packets that it
-/// took.
+/// Number of packets in `theirs` that the loop never took, or took in another order. `ours` are the packets that the
+/// loop took.
 fn invented(ours: &[Consumed], theirs: &[Consumed]) -> usize {
     let mut rest = ours.iter();
     theirs.iter().filter(|packet| !rest.any(|other| other == *packet)).count()
@@ -77,8 +77,8 @@ fn of_changed(lived: &DiveResult, replayed: &Replayed) -> Option<String> {
     Some(format!("the recording after its change ({change:?}): {what}"))
 }
 
-/// Checks that other devices' faults don't affect a device, that delays lose none of its frames, and that it runs again
-/// after all faults.
+/// Checks that other devices' faults don't affect a device, that delays lose none of its frames, and that the device
+/// runs again after all faults.
 fn of_line(lived: &DiveResult, number: usize, line: &Line) -> Option<String> {
     let finished = lived.plan.ending == Ending::Finished;
     let is_of = |fault: MachineFault| matches!(fault, MachineFault::LoopStalls | MachineFault::PortsStall);

@@ -56,11 +56,11 @@ pub use sabotage::Sabotage;
 
 /// Longest time step of the simulated world, ns.
 const LONGEST_STEP_NS: usize = 12_000_000;
-/// At the end of a dive, the world waits at most this long for data that is on its way to the loop.
+/// Longest time that the world waits at the end of a dive for data that is on its way to the loop.
 const PATIENCE: DurNs = DurNs::from_millis(4_000);
 /// Capacity of the queue of notices to the terminal. It is small so that the queue is soon full.
 const NOTICES: usize = 4;
-/// Recorded packets older than this are always synced. The age is half a second plus one step of the world.
+/// Age above which recorded packets are always synced. The age is half a second plus one step of the world.
 const SYNC_PERIOD: DurNs = DurNs::from_millis(500 + 13);
 
 const TUNNEL: &str = r#"name = "a world of faults"
@@ -148,7 +148,8 @@ impl World {
         Self::with(seed, None, None)
     }
 
-    /// As [`World::new`], but with a sabotage that breaks an invariant, and with only these of the seed's faults.
+    /// As [`World::new`], but with a sabotage that breaks an invariant, and with only those of the seed's faults that
+    /// are in `faults`.
     pub fn with(seed: u64, sabotage: Option<Sabotage>, faults: Option<&[Fault]>) -> Self {
         let mut random = Random(seed);
         let text = vehicle_text();
@@ -219,7 +220,8 @@ impl World {
         }
     }
 
-    /// The same world with another terminal. The terminal accepts nothing if `stands` is set, and everything otherwise.
+    /// The same world with another terminal. The terminal accepts nothing if `is_open` is set, and everything
+    /// otherwise.
     #[must_use]
     pub fn with_terminal(mut self, is_open: bool) -> Self {
         self.plan = self.plan.with_terminal(is_open);
@@ -326,7 +328,7 @@ impl World {
         self.take_syncs(now);
     }
 
-    /// Takes the syncs that are complete.
+    /// Removes complete syncs from the list, and counts their packets as certainly recorded.
     fn take_syncs(&mut self, now: MonoNs) {
         while let Some((_, count)) = self.syncing.pop_front_if(|(complete, _)| *complete <= now) {
             self.certain = count;
@@ -410,7 +412,7 @@ impl DiveResult {
     ) -> Result<Box<Replayed>, String> {
         let (number, mut left) = (self.certain % self.left.len(), self.left.clone());
         let own = &mut left[number].bytes;
-        // A part that is doubled or joined is first cut, in half of the worlds.
+        // In half of the worlds, a part that is to be doubled or joined is cut before.
         if change == LogChange::Cut || change != LogChange::Reordered && self.certain.is_multiple_of(2) {
             own.truncate(self.certain * 257 % own.len().max(1));
         }

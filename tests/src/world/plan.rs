@@ -6,15 +6,16 @@ use headrace_geometry::time::{DurNs, MonoNs};
 
 use crate::random::Random;
 
-/// Time of the simulated clock at which dives start. It isn't zero, as if the machine was switched on some time before.
+/// Time of the simulated clock at which dives start. It isn't zero, as if the machine had been switched on some time
+/// before the dive.
 pub const BEGIN: MonoNs = MonoNs(1_000_000_000);
-/// Faults begin within this time from the start of a dive, ns.
+/// Time from the start of a dive within which faults begin, ns.
 const BEGIN_WITHIN_NS: usize = 6_000_000_000;
 const END_WITHIN_NS: usize = 7_000_000_000;
-/// Duration of a dive. It includes time to recover after the last fault.
+/// Duration of a dive. It includes time in which the program recovers after the last fault.
 const LENGTH: DurNs = DurNs(12_000_000_000);
 /// Longest delay on a cable, ns. It is shorter than any silence timeout. `LONGEST_STALL_NS` is the longest stall of the
-/// loop or recorder. It is long enough to fill the queues.
+/// loop or recorder. Such a stall is long enough to fill the queues.
 const LONGEST_HOLD_NS: usize = 1_500_000_000;
 const LONGEST_STALL_NS: usize = 7_000_000_000;
 const LONGEST_NS: usize = 3_000_000_000;
@@ -149,7 +150,7 @@ pub enum LogChange {
     Reordered,
     /// A part, possibly cut, is appended to itself.
     Doubled,
-    /// The next part is appended to a part, which may be cut.
+    /// The next part is appended to a part, possibly after the latter was cut.
     Joined,
     /// A part is cut.
     Cut,
@@ -256,7 +257,7 @@ impl Plan {
         cables.chain(machine).chain(disk).chain(self.log.map(Fault::Log)).chain(ending).collect()
     }
 
-    /// The same plan with these faults only.
+    /// The same plan, but with only the faults `faults`.
     #[must_use]
     pub fn with_only(&self, faults: &[Fault]) -> Self {
         let cables = vec![Vec::new(); self.cables.len()];
@@ -275,7 +276,7 @@ impl Plan {
         plan
     }
 
-    /// The same plan with another terminal. The terminal accepts nothing if `stands` is set, and everything otherwise.
+    /// The same plan with another terminal. The terminal accepts nothing if `is_open` is set, and everything otherwise.
     #[must_use]
     pub fn with_terminal(mut self, is_open: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);
@@ -284,7 +285,7 @@ impl Plan {
         self
     }
 
-    /// Whether a fault of the machine is active at this time.
+    /// Whether a fault of the machine is active at the time `now`.
     pub fn has(&self, fault: MachineFault, now: MonoNs) -> bool {
         self.machine.iter().any(|window| window.what == fault && window.holds(now))
     }

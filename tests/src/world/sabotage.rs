@@ -3,7 +3,7 @@
 /// A deliberate violation of an invariant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sabotage {
-    /// Every hundredth frame of a device without faults is lost on its way.
+    /// Every hundredth frame of a device without planned faults is lost on its way.
     CableLoses,
     /// When the connection of one device breaks, the connection of another device breaks, too.
     NeighbourBreaks,

@@ -266,7 +266,7 @@ fn seconds(loss: &str, word: &str) -> f64 {
     rest.split_whitespace().next().unwrap().parse().unwrap()
 }
 
-/// Replaces every number with #, because only the words of the text matter.
+/// Replaces every number with #, because the test compares only the words.
 fn without_numbers(text: &str) -> String {
     let mut short = String::new();
     for c in text.chars().map(|c| if c.is_ascii_digit() { '#' } else { c }) {
@@ -301,7 +301,8 @@ fn truncated_log_is_used_up_to_the_cut_and_the_rest_reported_lost() {
             let last_s = (messages[read - 1].log_time - messages[0].log_time) as f64 * 1e-9;
             assert!((seconds(losses[0], "after") - last_s).abs() < 1e-3, "{losses:?}, last {last_s}");
 
-            // The readable part of the damaged log gives the same results as an intact log with only these messages.
+            // The readable part of the damaged log gives the same results as an intact log with only the messages of
+            // this part.
             write_log(&folder.path("short.mcap"), WriteOptions::new(), Some(VEHICLE), &messages[..read]);
             let (_, short) = folder.replay("short.mcap", &[]);
             assert_eq!(report["digest"], short["digest"], "{log} {tenths}");

@@ -281,7 +281,7 @@ fn json_has_every_error_with_its_line() {
     assert_eq!(errors[1]["line"], line("id = \"imu\""));
 }
 
-/// CSV text of a surveyed profile: a circle with a radius of 3 m and this number of points.
+/// CSV text of a surveyed profile: a circle with a radius of 3 m and `points` points.
 fn surveyed(points: u32) -> String {
     let mut text = "y_m,z_m\n".to_owned();
     for k in 0..points {

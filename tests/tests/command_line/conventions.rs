@@ -117,7 +117,8 @@ fn report_is_complete_on_a_non_blocking_pipe() {
     let folder = Folder::with_dive();
     let (mut reader, mut writer) = std::io::pipe().unwrap();
     fcntl_setfl(&writer, OFlags::NONBLOCK).unwrap();
-    // Nearly fills the pipe, which holds 64 KiB. The spaces do no harm, because JSON allows leading spaces.
+    // Nearly fills the pipe, which holds 64 KiB. The spaces don't make the report invalid, because JSON allows leading
+    // spaces.
     writer.write_all(&vec![b' '; 60_000]).unwrap();
     let mut command = program();
     command.args(["replay", "dive.mcap", "--json"]).current_dir(folder.path("")).stdout(writer);
@@ -214,7 +215,8 @@ fn unwritable_output_is_a_failure() {
     // A live dive succeeds even if its stdout is redirected to a full disk.
     let dive = ["run", "vehicle.toml", "--source", "dive.mcap", "--speed", "max"];
     assert_eq!(code(&dive, full()).0, Some(0));
-    // If a reader closes its end of the pipe, this is no error, because it wants no more output.
+    // If a reader closes its end of the pipe, the program must not report an error, because the reader wants no more
+    // output.
     for arguments in [&["replay", "live.mcap"][..], &["replay", "live.mcap", "--json"], &["help"], &dive] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);

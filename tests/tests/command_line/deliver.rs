@@ -87,7 +87,8 @@ fn two_deliveries_have_identical_bytes() {
     assert!(folder.read("out/report.pdf").starts_with(b"%PDF-1.7"));
 }
 
-/// Every number in a table or beside a name is one of the JSON report, rounded to the digits that are printed.
+/// Every number in a table or beside a name must be a number of the JSON report, rounded to the digits that are
+/// printed.
 #[test]
 fn numbers_of_the_report_are_those_of_the_json() {
     let mut compared = 0;

@@ -1,5 +1,5 @@
-//! Advice to a pilot who goes back for a missed stretch. The stretch is announced once and cleared once. No needless
-//! speed limit appears on the way.
+//! Advice to a pilot who goes back for a missed stretch. The program must announce the stretch once and clear it once.
+//! On the way, no needless speed limit may be displayed.
 
 use headrace_tests::{Folder, root};
 use serde_json::Value;
@@ -60,7 +60,7 @@ fn missed_stretch_of_the_demonstration_is_announced_once_and_cleared_once() {
     assert_eq!(end["summary"]["fail_m"], 0.0, "{end}");
 }
 
-/// A scene in which the vehicle drives out at this speed and goes back at a high speed.
+/// A scene in which the vehicle drives out at the speed `there_mps` and goes back at a high speed.
 fn there_and_back(there_mps: f64) -> Vec<Value> {
     json_lines(&format!(
         "vehicle = \"vehicle.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"waypoints\"\n\
@@ -117,7 +117,8 @@ fn missed_and_back(to_m: f64, on_mps: Option<f64>) -> String {
     )
 }
 
-/// The displayed position is that of the vehicle's origin. Heads are mounted ahead of this origin and behind it.
+/// The displayed position is the position of the vehicle's origin. Heads are mounted ahead of this origin and behind
+/// it.
 #[test]
 fn following_the_go_back_advice_clears_every_missed_section() {
     let end = |lines: &[Value]| of(lines, "end")[0]["summary"]["fail_m"].as_f64().unwrap();

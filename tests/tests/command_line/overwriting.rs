@@ -196,7 +196,7 @@ fn outputs_are_checked_before_the_work_begins() {
             &["recover", "dive.mcap", "-o", wrong],
         ] {
             let answer = folder.headrace(command);
-            // Stdout is empty, so no dive was shown and no work was done.
+            // Stdout is empty, which proves that no dive was shown and no work was done.
             assert_eq!(
                 (answer.code, answer.stdout.as_str()),
                 (Some(2), ""),
@@ -233,7 +233,7 @@ fn command_never_writes_its_own_input() {
     for further in [["--record", "vehicle.toml"], ["--record", "live.mcap"]] {
         never(&folder, &[&run[..], &further].concat());
     }
-    // A vehicle file may have any name, even one that looks like a report's.
+    // A vehicle file may have any name, even one that looks like the name of a report.
     folder.write("vehicle.json", VEHICLE);
     never(&folder, &["run", "vehicle.json", "--source", "live.mcap", "--report", "./vehicle.json"]);
     let import = ["import", "candump.log", "--source", "imu=can0", "--vehicle", "vehicle.toml", "-o"];
@@ -329,7 +329,7 @@ fn expected_report_is_read_before_the_replay_and_not_replaced() {
     folder.write("broken.json", "{");
     for expected in ["none.json", "broken.json", "dive.mcap"] {
         let answer = folder.headrace(&["replay", "dive.mcap", "--expect", expected]);
-        // Stdout is empty, so nothing was replayed.
+        // Stdout is empty, which proves that nothing was replayed.
         assert_eq!((answer.code, answer.stdout.as_str()), (Some(2), ""), "{expected}: {}", answer.stderr);
         assert!(answer.stderr.contains(expected), "{}", answer.stderr);
     }
@@ -371,7 +371,8 @@ fn existing_file_stays_if_the_new_one_cannot_be_written() {
     }
 }
 
-/// Until the simulation is complete, it writes to an unnamed file. The test needs a file system that has unnamed files.
+/// Until the simulation is complete, it writes to a file without a name. The test needs a file system that has unnamed
+/// files.
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_simulation_leaves_no_file() {

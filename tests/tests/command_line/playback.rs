@@ -94,7 +94,7 @@ fn interrupted_demonstration_keeps_its_report_and_summary() {
     assert_eq!(replayed["digest"], report["digest"]);
 }
 
-/// Address of the page in a program's output.
+/// Address of the operator's page, as printed in the program's output.
 fn page_address(screen: &Screen) -> String {
     let shown = screen.until("m/s");
     let (_, rest) = shown.split_once("page   http://").unwrap();

@@ -2,7 +2,7 @@
 
 use headrace_tests::{Folder, root};
 
-/// Text in the README before the demonstration's output, which is indented by four spaces.
+/// Text in the README directly before the demonstration's output. The output is indented by four spaces.
 const BEGIN: &str = "leaves a report and a log in `headrace-demo/`:\n\n";
 /// Line in the README that stands for omitted output lines.
 const LEFT_OUT: &str = "    [...]";
@@ -24,7 +24,7 @@ fn excerpt(stdout: &str) -> String {
     shown.join(&format!("{LEFT_OUT}\n"))
 }
 
-/// Rewrite the output with `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme`.
+/// To rewrite the output, run `HEADRACE_RENEW_README=1 cargo test -p headrace_tests --test command_line readme`.
 #[test]
 fn readme_shows_the_current_demonstration_output() {
     let folder = Folder::new();

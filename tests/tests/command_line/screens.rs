@@ -62,8 +62,8 @@ fn piped_output_has_no_colours_and_no_broken_lines() {
     insta::assert_snapshot!(answer.stdout.split("digest").next().unwrap());
 }
 
-/// The pilot slows down, but then heads die. The wall is therefore still missed, but for another cause. It remains a
-/// single missed stretch, and the new cause is announced too.
+/// The pilot slows down, but then heads die. The wall is therefore still missed, but for another cause. The stretch
+/// remains a single missed stretch, and the new cause is announced too.
 #[test]
 fn missed_stretch_is_announced_again_when_its_cause_changes() {
     let folder = dive();

@@ -12,7 +12,8 @@ const QUICK: [(&str, &[&str]); 2] =
 /// Duration of the rehearsal, s: the first value in the tutorial, the second in the test.
 const REHEARSAL_S: [&str; 2] = ["300", "3"];
 
-/// Interval at which the test looks for the rehearsal's vehicle file. It looks `WAITS` times, for one minute.
+/// Interval at which the test looks for the rehearsal's vehicle file. The test looks up to `WAITS` times, which takes
+/// one minute.
 const WAIT: Duration = Duration::from_millis(50);
 const WAITS: usize = 1200;
 

@@ -197,7 +197,7 @@ fn summary_and_indexes_match_a_full_read() {
         let indexes: Vec<_> = summary.read_message_indexes(&log, chunk).unwrap().into_iter().collect();
         for (channel, entries) in indexes {
             *indexed.entry(channel.id).or_default() += entries.len() as u64;
-            // Every lookup decompresses the chunk, so only some of the index entries are checked.
+            // Every lookup decompresses the chunk, so the test checks only some of the index entries.
             for entry in entries.into_iter().step_by(41) {
                 let message = summary.seek_message(&log, chunk, &entry).unwrap();
                 assert_eq!((message.channel.id, message.log_time), (channel.id, entry.log_time));

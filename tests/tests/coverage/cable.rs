@@ -59,8 +59,8 @@ fn stuck(seed: u64, speeds_mps: [f64; 2]) -> Stuck {
     Stuck { scene: scenes::seeded(&text, &load, Some(seed)), from_s }
 }
 
-/// Time at which a filter update doubts the cable counter because the counter contradicts the inertial unit; `None` for
-/// any other item.
+/// Time at which a filter update doubts the cable counter because the counter contradicts the inertial unit; `None` if
+/// the item is anything else.
 fn doubted_at(item: &PlacedItem) -> Option<MonoNs> {
     let Placement::Update(update) = &item.placement else { return None };
     update.doubts.cable.filter(|doubt| doubt.log.is_none()).map(|_| update.at)
@@ -139,7 +139,7 @@ fn no_section_far_over_the_target_passes_with_a_stuck_cable() {
 }
 
 /// A misaligned velocity log measures three quarters of the speed. The cable counter is right, but no third sensor
-/// shows which of the two is wrong.
+/// shows whether the counter or the log is wrong.
 #[test]
 fn velocity_log_that_contradicts_the_counter_is_reported_and_causes_no_false_pass() {
     let log = "\n[[sensors]]\nid = \"dvl\"\nplugin = \"a50\"\nposition_m = [-0.2, 0, -0.1]\n";
@@ -163,7 +163,7 @@ fn velocity_log_that_contradicts_the_counter_is_reported_and_causes_no_false_pas
     let [alert] = observed(&wrong.report)[..] else { panic!("{:?}", wrong.report.alert_list) };
     assert_eq!((alert.kind, alert.sensor.as_deref()), ("cable_doubted", Some("dvl")));
     // The velocity log measures a quarter too little. In a minute, the vehicle moves by 12 m and the log misses at most
-    // 3 m of this.
+    // 3 m of these.
     assert!((0.5..3.5).contains(&alert.worst_m.unwrap()), "{alert:?}");
     let target_m = wrong.report.target_m;
     let is_wrong = |section: &&truth::JudgedSection| {

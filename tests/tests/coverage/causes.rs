@@ -9,8 +9,8 @@ use headrace_tests::instrumented;
 const ALWAYS: &str = "[effects.motion_within_turn]\n[effects.range_noise]\nsd_m = 0.01\n\
     [effects.imu_noise]\ngyro_degps_rthz = 0.005\n";
 const STEADY: &str = "[trajectory]\nstart_m = 3\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.185\n";
-/// Chainages that the test evaluates, m. Sections near the ends of the dive are left out, because some heads don't
-/// reach them.
+/// Range of chainages that the test evaluates, m. Sections near the ends of the dive are left out, because some heads
+/// don't reach them.
 const INNER_M: std::ops::Range<f64> = 5.5..13.0;
 const SEEDS: u64 = 2;
 

@@ -6,7 +6,7 @@ use headrace_monitor::report::Report;
 use headrace_monitor::section_row::SectionRow;
 use headrace_tests::instrumented;
 
-/// The speed increases, so the holes grow from well below the target to well above it.
+/// A scene in which the speed increases, so that the holes grow from well below the target to well above it.
 fn scene() -> String {
     let leg = |k: u32| {
         let speed_mps = 0.11 + 0.004 * f64::from(k);

@@ -1,4 +1,5 @@
-//! Cable counters with steps of 1 cm, on swinging cables. They cause no wrong displayed speed and no wrong verdict.
+//! Cable counters with steps of 1 cm, on swinging cables. They must cause no wrong displayed speed and no wrong
+//! verdict.
 
 use headrace_coverage::Verdict;
 use headrace_simulator::Scene;
@@ -95,8 +96,8 @@ fn dives(legs: Legs, slack: &str) -> (Wrong, f64) {
     (all, share)
 }
 
-/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. This inertial unit can't tell
-/// whether a speed change of 5 cm/s comes from the cable or from the vehicle. No section passes wrongly.
+/// If the cable swings by 11 cm but is declared taut, many sections stay undecided. The inertial unit in this test
+/// can't tell whether a speed change of 5 cm/s comes from the cable or from the vehicle. No section passes wrongly.
 #[test]
 fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
     let (wandering, swinging) = ([WANDERING, "0.06 m"], [SWINGING, "0.11 m"]);
@@ -110,8 +111,8 @@ fn coarse_counters_on_swinging_cables_give_no_wrong_speed_or_verdict() {
         println!("slack of {reach}: {wrong:?}, can't say {:.1} %", 100.0 * cannot_say);
         assert!(wrong.sections > 200, "{reach}: {wrong:?}");
         assert!(wrong.speed_mps < SPEED_OFF_MPS, "{reach}: {wrong:?}");
-        // A false pass may miss a rock, but a false fail costs only a drive back. One section in a hundred may
-        // therefore fail falsely.
+        // A false pass may hide a rock, but a false fail costs only a drive back. One section in a hundred may
+        // therefore fail falsely, and none may pass falsely.
         assert!(wrong.passed == 0 && 100 * wrong.failed <= wrong.sections, "{reach}: {wrong:?}");
         assert!(cannot_say <= most, "{reach}: {cannot_say}");
     }

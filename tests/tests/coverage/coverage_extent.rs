@@ -17,7 +17,7 @@ const HEAD_M: f64 = 0.551;
 const START_M: f64 = 3.0;
 const SPEED_MPS: f64 = 0.11;
 
-/// Report of a dive at the constant planned speed with these simulator effects.
+/// Report of a dive at the constant planned speed with the simulator effects `effects`.
 fn steady(distance_m: f64, effects: &str) -> Report {
     let scene = format!(
         "seed = 3\nvehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = {START_M}\n[[trajectory.legs]]\n\
@@ -51,7 +51,7 @@ fn accounted_for(what: &str, report: &Report) {
     assert!(report.sections.iter().all(judged), "{what}");
 }
 
-/// Checks that a section fails, and that its reported cause is the silence of these heads.
+/// Checks that a section fails, and that its reported cause is the silence of the heads `heads`.
 #[track_caller]
 fn fails_by_silence(section: &SectionRow, heads: &[usize]) {
     let evidence = section.cause.unwrap();
@@ -83,8 +83,8 @@ fn sections_without_any_live_head_fail_as_the_vehicle_leaves_them() {
     for section in dark {
         fails_by_silence(section, &[0, 1, 2, 3]);
         let late_s = late_s(section, HEAD_M);
-        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the
-        // section's start is left, because a circle centred there may exceed the target.
+        // The upper limit allows for one update and the position margin. The flag may be raised as soon as the heads
+        // have left the section's start, because a circle centred at the start may exceed the target.
         assert!((-0.25 / SPEED_MPS - 0.1..2.5).contains(&late_s), "{}: {late_s} s late", section.start_m);
     }
     let home = report.go_back.iter().map(|back| back.from_m).fold(0.0, f64::max);
@@ -187,8 +187,8 @@ fn flags_wait_only_for_live_heads() {
     assert!(inner.len() > 10);
     for section in inner {
         fails_by_silence(section, &[1, 2, 3]);
-        // The flag waits only for the live front head. This head leaves the section ten seconds before the silent aft
-        // heads.
+        // The flag waits only for the front head, which still works. This head leaves the section ten seconds before
+        // the silent aft heads do.
         let late_s = late_s(section, -HEAD_M);
         assert!(late_s < 4.0, "{}: {late_s} s late", section.start_m);
     }
@@ -351,8 +351,8 @@ fn dive_mostly_without_a_position_exits_with_1() {
 }
 
 /// Wall that the heads scanned while the tether was silent has no verdict. The report tells for how long the position
-/// was missing, and about where. The vehicle drives at 0.11 m/s. The counter falls silent at 60 s, and the position is
-/// lost some seconds later.
+/// was missing, and about where the vehicle was then. The vehicle drives at 0.11 m/s. The counter falls silent at 60 s,
+/// and the position is lost some seconds later.
 #[test]
 fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainage() {
     let noise = "imu_noise = { gyro_degps_rthz = 0.007, accel_mps2_rthz = 0.001, attitude_deg = 0.3 }\n\
@@ -363,11 +363,11 @@ fn stretch_scanned_without_a_position_is_reported_by_duration_and_likely_chainag
         let [gap] = &report.position_gaps[..] else { panic!("{span}: {:?}", report.position_gaps) };
         let true_m = |at_s: f64| START_M + SPEED_MPS * at_s;
         let end_s = if is_over { 120.0 } else { 20.0 / SPEED_MPS };
-        // When the counter is back, its reading is compared with the estimate before there is a fix.
+        // When the counter sends data again, the filter compares its reading with the estimate before there is a fix.
         let late_s = gap.to_s - end_s;
         assert!((-2.0..15.0).contains(&late_s) && gap.is_over == is_over, "{span}: {gap:?}");
         assert!((60.0..100.0).contains(&gap.from_s), "{span}: {gap:?}");
-        // 50 pings per second of each of the four heads.
+        // Each of the four heads pings 50 times per second.
         let pings = 200.0 * (gap.to_s - gap.from_s);
         assert!((gap.pings as f64 - pings).abs() < 0.05 * pings, "{span}: {gap:?}");
         let (from_m, to_m) = (gap.from_m.unwrap(), gap.to_m.unwrap());

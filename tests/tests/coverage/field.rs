@@ -121,8 +121,8 @@ fn stop_before_the_dive_reduces_the_undecided_metres() {
     assert!(stood <= 0.02, "share of undecided metres: {stood} with a stop, {at_once} without");
 }
 
-/// If every verdict is set to pass, all false passes are counted. If every verdict is set to fail, all false fails are
-/// counted.
+/// If every verdict is set to pass, the statistics must count all false passes. If every verdict is set to fail, they
+/// must count all false fails.
 #[test]
 fn field_statistics_count_all_false_passes_and_false_fails() {
     let vehicle = VEHICLES.into_iter().find(|vehicle| vehicle.name == "vita2-4").unwrap();

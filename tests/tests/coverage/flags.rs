@@ -15,8 +15,8 @@ use headrace_tests::random_dives::{Kind, Seeded};
 
 use crate::dives::DIVES;
 
-/// A dive and its due flags by two definitions of a fail. By the first, the hole exceeds the target. By the second, it
-/// exceeds the target by two standard deviations.
+/// A dive and its due flags by two definitions of a fail. By the first definition, the hole exceeds the target. By the
+/// second definition, the hole exceeds the target by two standard deviations.
 struct Judged {
     seeded: &'static Seeded,
     dive: &'static Dive,
@@ -113,8 +113,8 @@ fn flag_is_raised_within_25_cm_of_the_point_of_no_return() {
         let flags =
             if direct(judged) { &judged.by_two_sigma } else { &judged.journey.flags(judged.dive, 3.0) };
         for flag in flags {
-            // While the estimate converges, standard deviations shrink, but the report has only the final ones. Such
-            // early flags don't count.
+            // While the estimate converges, standard deviations shrink, but the report has only the final ones. Flags
+            // that are due during this time don't count.
             let settles = !direct(judged) && flag.due_s.is_some_and(|due_s| due_s < SETTLED_S);
             let is_late = flag.late_m.filter(|_| !settles).map(|late_m| late_m > LATE_M);
             on_time += u32::from(is_late == Some(false));

@@ -1,10 +1,10 @@
-//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both are reported once and
-//! counted, and neither makes a section pass.
+//! Impossible walls: samples outside the tunnel, and a profile that contradicts the returns. Both must be reported once
+//! and counted, and neither may make a section pass.
 
 use headrace_tests::{Folder, SCENE, VEHICLE};
 use serde_json::Value;
 
-/// Simulates and replays a dive with these files. Returns its report and terminal output.
+/// Simulates and replays a dive with the files `vehicle` and `scene`. Returns its report and terminal output.
 fn dive(vehicle: &str, scene: &str) -> (Value, String) {
     let folder = Folder::new();
     folder.write("vehicle.toml", vehicle);

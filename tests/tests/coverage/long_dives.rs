@@ -11,7 +11,7 @@ use headrace_tests::truth::{self, JudgedDive};
 const PARKED_S: u32 = 3600;
 /// Number of times that the vehicle goes back and forth.
 const ROUNDS: usize = 100;
-/// The vehicle goes back and forth between this chainage and `TO_M`, m.
+/// Start of the stretch over which the vehicle goes back and forth, m. The stretch ends at `TO_M`.
 const FROM_M: f64 = 5.0;
 const TO_M: f64 = 9.0;
 /// Chainage of the end of the dive, m.
@@ -74,7 +74,7 @@ fn hour_of_parking_and_hundred_trips_back_and_forth_change_no_verdict() {
     println!("{passed} sections pass; D off by {off_m:?} m; {used:?} bytes");
     assert!(off_m[1] <= off_m[0] + 0.01, "{off_m:?}");
     found("loop.rounds", off_m[1], 0.02);
-    // Memory may hardly grow in the last two thirds of the parked hour, and in the last quarter of the rounds.
+    // Memory may grow only slightly in the last two thirds of the parked hour, and in the last quarter of the rounds.
     let parked = PARKED_S as usize / 60;
     let rounds = used.len() - 3 - parked;
     let grown = |from: usize, to: usize| used[to] as f64 / used[from] as f64 - 1.0;

@@ -50,6 +50,6 @@ fn memory_does_not_grow_while_the_vehicle_is_stationary() {
     }
     let [early, late] = [seen[seen.len() / 2].1, seen.last().unwrap().1];
     assert!(late[0] * 100 <= early[0] * 105, "samples: {early:?}, then {late:?} bytes");
-    // The history of advice has one entry every ten seconds, plus a few.
+    // The history of advice has one entry every ten seconds, plus a few more entries.
     assert!(late[1] < 500, "advice: {late:?} entries");
 }

@@ -21,7 +21,7 @@ use serde_json::Value;
 
 const TOLERANCE_M: f64 = 1e-9;
 
-/// Two dives. After a transformation, the results of the second must agree with those of the first.
+/// Two dives. After a transformation, the results of the second dive must agree with the results of the first dive.
 struct Beside<'a> {
     here: &'a Dive,
     there: &'a Dive,
@@ -88,7 +88,7 @@ impl Beside<'_> {
     }
 }
 
-/// Vehicle file without a navigation filter, with heads at these positions in the body frame.
+/// Vehicle file without a navigation filter, with heads at the positions `heads` in the body frame.
 ///
 /// If `side` is -1, the vehicle is mirrored: the positions and turning directions of its heads, and the directions of
 /// its echosounders.

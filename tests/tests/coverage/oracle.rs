@@ -71,7 +71,7 @@ fn is_within(section: &SectionRow, diameter_m: f64) -> bool {
     (least_m - TOLERANCE_M..=most_m + TOLERANCE_M).contains(&diameter_m)
 }
 
-/// Whether a section passed and this diameter is at most the upper bound of the section's hole. The program may have
+/// Whether a section passed and the diameter is at most the upper bound of the section's hole. The program may have
 /// computed the bound from some visits of the vehicle only. The oracle uses the samples of all visits, which can only
 /// make the hole smaller.
 fn is_of_a_visit(section: &SectionRow, diameter_m: f64) -> bool {
@@ -146,7 +146,7 @@ fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
             {
                 either
             }
-            // Doubtful returns may be why a section is undecided, but the oracle knows only samples.
+            // The reason why a section is undecided may be doubtful returns, but the oracle knows only samples.
             either @ Verdict::CannotSay if section.cannot_say == Some(Unsure::DoubtfulReturns) => either,
             // A flagged section keeps the verdict "fail" until its hole is filled.
             either @ Verdict::Fail if section.flagged_s.is_some() && section.cleared_s.is_none() => either,
@@ -159,7 +159,7 @@ fn verdicts_follow_from_hole_size_its_sd_and_the_target() {
     });
 }
 
-/// Describes how a reported spread differs from that of these values; `None` if both match.
+/// Describes how a reported spread differs from the spread of `values`; `None` if both match.
 ///
 /// Variances are compared, because the standard deviation of equal values is the root of a rounding error.
 fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
@@ -176,8 +176,8 @@ fn differs(got: &SpreadReport, values: &[f64]) -> Option<String> {
 
 /// Whether a section has samples that deviate from the design by more than a tenth of the radius.
 ///
-/// A return that deviates so much is stored only after the next returns of its head. Meanwhile, later samples of other
-/// heads may be stored. They then count as earlier passes.
+/// A return that deviates so much is stored only after the next returns of its head. Until then, later samples of other
+/// heads may be stored. These samples then count as earlier passes.
 fn has_run(section: &SectionRow, perimeter_m: f64) -> bool {
     let extremes_m = section.deviation.map(|deviation| [deviation.inmost_m, deviation.outmost_m]);
     extremes_m.into_iter().flatten().any(|off_m| off_m.abs() > 0.1 * perimeter_m / TAU)
@@ -241,8 +241,8 @@ fn holds(wall: &Wall, from_m: f64, to_m: f64, expected_m: f64) {
 #[test]
 fn holes_of_sample_lattices_match_exact_values() {
     let diagonal_m = math::sqrt(2.0);
-    // A lattice of squares of 0.25 m, in which the four corners of each square lie on a common circle. The second
-    // section contains no centre of a square.
+    // The samples form squares with sides of 0.25 m, in which the four corners of each square lie on a common circle.
+    // The second section contains no centre of a square.
     let squares = Wall::new(lattice(20, 24, |i, j| [0.25 * i, 0.25 * j]), 6.0).unwrap();
     holds(&squares, 1.0, 1.25, 0.25 * diagonal_m);
     holds(&squares, 1.0, 1.05, 2.0 * math::hypot(0.05, 0.125));
@@ -339,8 +339,8 @@ fn helix_spacings_match_the_formulas() {
         assert!((spacing.t_y_m.unwrap() - t_y_m).abs() < 1e-12);
         assert!((spacing.t_m[0].unwrap() - math::hypot(t_x_m + d_m, t_y_m)).abs() < 1e-12);
     }
-    // Ping 20 has no return. In the next turn, the pings beside its angle therefore have no T_x. The T_y of the return
-    // after ping 20 spans the gap.
+    // Ping 20 has no return. In the next turn, the pings at neighbouring angles therefore have no T_x. The T_y of the
+    // return after ping 20 spans the gap.
     pings[20].sample = None;
     let all = spacings(&pings, TAU * radius_m);
     assert!(

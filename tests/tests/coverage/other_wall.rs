@@ -3,7 +3,7 @@
 use headrace_tests::{Folder, VEHICLE};
 use serde_json::Value;
 
-/// A steady dive through a tunnel with this wall.
+/// A steady dive through a tunnel with the wall that `tunnel` describes.
 fn scene(tunnel: &str, [start_m, distance_m]: [f64; 2], effects: &str) -> String {
     format!(
         "name = \"other wall\"\nvehicle = \"vehicle.toml\"\n{tunnel}\n[trajectory]\nstart_m = {start_m}\n\
@@ -32,7 +32,7 @@ fn sections(report: &Value, from_m: f64, to_m: f64) -> Vec<&Value> {
 }
 
 /// From chainage 11 to 20 m, the radius is 23 % larger than designed. The wall is on average 0.66 m outside the design.
-/// The navigation filter takes a part of this deviation for a change of the vehicle's height.
+/// The navigation filter mistakes a part of this deviation for a change of the vehicle's height.
 fn wider_wall() -> String {
     let stations = [(0, 1.0), (9, 1.0), (11, 1.23), (20, 1.23), (22, 1.0)];
     let station =
@@ -69,7 +69,7 @@ fn in_ceran() -> String {
     text.replace("target_m = 0.5", "target_m = 0.6")
 }
 
-/// The lines that a summary suggests to append to the vehicle file.
+/// The lines which, according to a summary, can be appended to the vehicle file.
 fn declaration(summary: &str) -> String {
     let lines = summary.lines().skip_while(|line| !line.contains("append to the vehicle file"));
     lines.skip(1).take_while(|line| line.starts_with("    ")).collect::<Vec<_>>().join("\n")

@@ -132,7 +132,8 @@ fn cell(vehicle: &str, condition: Condition) -> Cell {
     Cell { vehicle, condition, start_m: 100.0, let_in_m: None, driven: Driven::Planned }
 }
 
-/// If sound is faster than configured, measured ranges are too short. If the tunnel is too wide, they are too long.
+/// If sound is faster than configured, measured ranges are too short. If the tunnel is wider than designed, they are
+/// too long.
 #[test]
 fn wrong_range_scale_is_reported_with_its_value() {
     let wrong = [(Condition::WrongSound, 1.0 / 1.04 - 1.0), (Condition::WrongWall, 0.06)];
@@ -168,7 +169,7 @@ fn correct_settings_are_not_reported() {
 }
 
 /// If a head sees only a round vault about its own axis, its rotation can't be observed. Without noise, the head's
-/// range errors of some millimetres are constant. They must not be mistaken for a wrong setting.
+/// range errors of some millimetres are constant. These errors must not be mistaken for a wrong setting.
 #[test]
 fn millimetre_range_errors_under_a_round_vault_are_not_reported_as_rotation() {
     for layout in ["sector_offset", "phase_shift"] {

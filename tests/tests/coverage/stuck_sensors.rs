@@ -1,4 +1,4 @@
-//! Stuck devices: a head or inertial unit that repeats the same output for ever counts as silent.
+//! Stuck devices: a head or inertial unit whose output never changes counts as silent.
 
 use headrace_coverage::Cause;
 use headrace_coverage::Verdict;
@@ -10,7 +10,8 @@ const NOISE: &str = "motion_within_turn = {}\nocclusion = {}\nrange_noise = { sd
 const SWAY: &str =
     "pilot_drift = { across_m = 0.3, up_m = 0.2, yaw_deg = 12, pitch_deg = 3, period_s = 25 }\n";
 
-/// A scene of VITA 2 with four heads. The vehicle is stationary for a minute, and then drives the way `way` (m, m/s).
+/// A scene of VITA 2 with four heads. The vehicle is stationary for a minute, and then drives the distance at the speed
+/// that `way` gives (m, m/s).
 fn scene(start_m: f64, way: (f64, f64), effects: &str) -> Scene {
     seeded(5, start_m, way, effects)
 }
@@ -55,8 +56,8 @@ fn dive(scene: &Scene) -> Reported {
     }
 }
 
-/// A stuck inertial unit can't be detected within a second. During this second, the position error is smaller than the
-/// margin with which a section must pass.
+/// A stuck inertial unit can't be detected within a second. During this second, the position error stays smaller than
+/// the margin by which a hole must be below the target.
 #[test]
 fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
     let (mut passed, mut over) = (0, 0);
@@ -78,8 +79,8 @@ fn stuck_inertial_unit_is_reported_and_no_section_far_over_the_target_passes() {
 }
 
 /// A stuck head repeats one angle and one range; a head without returns keeps turning. Both heads have the same
-/// consequences. The advised speed is that for a silent head, the cause is a silent or stalled head, and an alert names
-/// the head.
+/// consequences. The advised speed is the speed for a silent head, the displayed cause is a silent or stalled head, and
+/// an alert names the head.
 #[test]
 fn head_without_returns_is_reported_as_silent() {
     let deaf = "stuck_range = { range_m = 0.3, from_s = 90, sensors = [\"sonar_1\"] }\n";

@@ -1,5 +1,5 @@
-//! True holes as the oracle computes them match those of another program. That program shares no code with the oracle
-//! or with headrace.
+//! True holes as the oracle computes them match the results of another program, which shares no code with the oracle or
+//! with headrace.
 
 use std::path::Path;
 use std::process::Command;

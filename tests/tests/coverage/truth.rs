@@ -17,7 +17,7 @@ fn dive(start_m: f64, effects: &str) -> JudgedDive {
     )))
 }
 
-/// Samples sorted into strips of chainage, for a search that shares no method with the oracle's triangulation.
+/// Samples sorted into strips of chainage, for a search that doesn't use the oracle's method, a triangulation.
 struct Strips<'a> {
     truth: &'a Truth,
     from_m: f64,
@@ -97,7 +97,7 @@ fn outline_arc_lengths_match_the_profile() {
     for profile in profiles {
         let outline = Outline::of(&profile);
         for k in 0..5_000 {
-            // The tested points lie on both sides of the wall, all around it.
+            // The tested points lie inside and outside the wall, all around it.
             let off_m = 0.3 + 1.5 * math::wrap(0.37 * f64::from(k), 1.0);
             let [y, z] = profile.point_at(0.618 * profile.perimeter_m() * f64::from(k));
             let [y0, z0] = profile.reference();
@@ -111,13 +111,13 @@ fn outline_arc_lengths_match_the_profile() {
 
 /// Whether a section can be judged in this test.
 ///
-/// It must be at least 1.5 m beyond the start, because the position estimate has converged there. Its true hole must be
-/// below 0.7 m, because larger holes occur only at the end of the dive.
+/// It must be at least 1.5 m beyond the start, because the position estimate has converged by then. Its true hole must
+/// be below 0.7 m, because larger holes occur only at the end of the dive.
 fn settled(section: &truth::JudgedSection, start_m: f64) -> bool {
     settled_below(section, start_m, 0.7)
 }
 
-/// As [`settled`], but with the limit `hole_m` for the true hole.
+/// Whether a section can be judged as in [`settled`], but with the limit `hole_m` for the true hole.
 fn settled_below(section: &truth::JudgedSection, start_m: f64, hole_m: f64) -> bool {
     section.report.start_m > start_m + 1.5 && section.true_hole_m < hole_m
 }

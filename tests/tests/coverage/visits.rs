@@ -29,7 +29,7 @@ fn vehicle(name: &str) -> Result<Vec<u8>, String> {
     Ok(file.replace("slack_time_s = 10", "slack_time_s = 60").into_bytes())
 }
 
-/// Start chainages of the sections with this verdict between two chainages, m.
+/// Start chainages of the sections with this verdict that lie between two chainages, m.
 fn with_verdict(dive: &truth::JudgedDive, verdict: Verdict, [from_m, to_m]: [f64; 2]) -> Vec<String> {
     let within = dive.sections.iter().map(|section| &section.report);
     let within = within.filter(|section| section.start_m >= from_m && section.end_m <= to_m);
@@ -72,7 +72,7 @@ fn driving_back_revokes_no_pass() {
     assert!(lost.is_empty(), "{lost:?}");
 }
 
-/// The vehicle is too fast on both visits, and the slack of the cable differs between the visits.
+/// The vehicle is too fast on both visits, and the slack of the cable is different on each visit.
 #[test]
 fn no_section_far_over_the_target_passes_after_two_visits_with_different_slack() {
     let (mut over, mut wrong, mut passed) = (0, 0, 0);

@@ -44,7 +44,7 @@ fn dive(heads: usize, effects: &str) -> Dive {
     instrumented::dive(&pipe(heads), &format!("{CREEP}{effects}"))
 }
 
-/// Alerts that name this head, among those that report an observation about the dive.
+/// Alerts that report an observation about the dive and name this head.
 fn named<'a>(dive: &'a Dive, head: &str) -> Vec<&'a ListedAlertJson> {
     let mut alerts = observed(&dive.report);
     alerts.retain(|alert| alert.sensor.as_deref() == Some(head));
@@ -115,8 +115,8 @@ fn no_section_passes_with_a_head_stuck_at_one_range() {
     assert!(sound.report.summary.pass_m > 5.0, "{:?}", sound.report.summary);
     let alone = dive(1, "stuck_range = { sensors = [\"sonar_0\"] }\n");
     assert!(alone.report.summary.pass_m <= 0.0, "{:?}", alone.report.summary);
-    // A constant range from the centre of a round pipe could be true in a pipe with another radius, so only the profile
-    // is doubted.
+    // In the centre of a round pipe, a constant range could be right if the pipe has another radius. Only the profile
+    // is therefore doubted.
     let kinds: Vec<_> = observed(&alone.report).into_iter().map(|alert| alert.kind).collect();
     assert_eq!(kinds, ["profile_contradicted"]);
 }
@@ -147,7 +147,7 @@ fn one_stuck_head_of_several_is_reported_and_the_others_are_used() {
         let all = observed(&dive.report);
         assert!(all.iter().all(|alert| alert.sensor.as_deref().is_none_or(|head| head == id)), "{at}");
         assert!(dive.report.summary.pass_m >= least_m, "{at}");
-        // Without the stuck head's returns, the hole of a passed section is still at most 1.1 times the target.
+        // Without the stuck head's returns, the true hole of a passed section is still at most 1.1 times the target.
         let others = dive.samples_of(|head| head != stuck);
         let wall = Wall::new(others, dive.profile.perimeter_m()).unwrap();
         for section in dive.report.sections.iter().filter(|section| section.verdict == Verdict::Pass) {

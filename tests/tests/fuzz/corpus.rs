@@ -77,8 +77,8 @@ pub(crate) struct File {
 
 pub(crate) struct Corpus {
     pub(crate) files: Vec<File>,
-    /// Messages of each intact log. If a reader reports no loss, a damaged log must still contain all messages of an
-    /// intact log.
+    /// Messages of each intact log. If a reader reports no loss in a damaged log, it must still have read all messages
+    /// of one of these logs.
     pub(crate) said: Vec<Said>,
 }
 
@@ -199,7 +199,7 @@ fn ours(messages: u64) -> Vec<u8> {
     let header = LogHeader { sources: vec![source("depth"), source("imu")], ..LogHeader::default() };
     let mut log = LogWriter::new(Cursor::new(Vec::new()), &header).unwrap();
     for number in 0..messages {
-        // The generated log has several chunks, each of at most half a second.
+        // Messages are 40 ms apart, so that the log has several chunks, each of at most half a second.
         let at = BEGIN + DurNs::from_millis(i64::try_from(number * 40).unwrap());
         log.raw(u16::try_from(number % 2).unwrap(), at, at, &content(number)).unwrap();
     }
@@ -224,7 +224,7 @@ fn foreign(messages: u64, set: impl FnOnce(WriteOptions) -> WriteOptions) -> Vec
 }
 
 fn frame(sequence: u8) -> Vec<u8> {
-    // The last field isn't zero, because MAVLink drops trailing zeros and all 28 bytes must be sent.
+    // The last field isn't zero, because MAVLink drops trailing zeros, but all 28 bytes must be sent.
     let attitude = ATTITUDE_DATA { yawspeed: 1.0, ..ATTITUDE_DATA::DEFAULT };
     let frame = Message::Attitude(attitude).to_frame(MavHeader { system_id: 1, component_id: 1, sequence });
     frame.raw_bytes().to_vec()

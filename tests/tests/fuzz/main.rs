@@ -35,8 +35,8 @@ use headrace_tests::random::Random;
 use corpus::{Corpus, Kind};
 use targets::{Surroundings, try_one};
 
-/// Largest memory that a reader may use for one file, bytes, whichever sizes the file claims
-/// (`docs/reference/limits.md`).
+/// Largest memory that a reader may use for one file, bytes, even if the file claims larger sizes. Source:
+/// `docs/reference/limits.md`.
 const MOST_MEMORY: usize = 200 << 20;
 /// Longest time for one file. A file usually takes less than a hundredth of this time.
 const LONGEST: DurNs = DurNs::from_millis(20_000);
@@ -87,7 +87,7 @@ struct Trial {
 }
 
 impl Trial {
-    /// Keeps a failing file and returns a description.
+    /// Keeps a failing file on disk, and returns a description of the failure.
     fn found(&self, bytes: &[u8], problem: &str) -> String {
         let Self { seed, number, kind } = self;
         let path = std::env::temp_dir().join(format!("headrace-fuzz-{seed}-{number}.{}", kind.name()));

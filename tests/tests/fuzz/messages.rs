@@ -1,4 +1,4 @@
-//! Messages of a log, which may be broken.
+//! Reads the messages of a log, even of a damaged one.
 
 use std::collections::BTreeMap;
 use std::io::Cursor;

@@ -13,7 +13,8 @@ fn part(random: &mut Random, len: usize) -> core::ops::Range<usize> {
     start..(start + random.below(most)).min(len)
 }
 
-/// Returns a false length or count in place of `truth` that is likely to cause trouble.
+/// Returns a false length or count to replace the true one, `truth`. The false numbers are those that are likely to
+/// cause trouble.
 fn lie(random: &mut Random, truth: u64) -> u64 {
     match random.below(9) {
         0 => 0,

@@ -90,7 +90,7 @@ impl Surroundings {
     }
 
     /// One [`Taker`] for each sensor. A taker states which stream contains the sensor's data. In tables and ROS
-    /// recordings it is the stream with the sensor's name. In other files it is the only stream.
+    /// recordings, the stream has the sensor's name. Other files have only one stream.
     fn takers(&self, kind: Kind) -> Vec<Taker> {
         let line = match kind {
             Kind::Tlog => tlog::STREAM,
@@ -111,8 +111,8 @@ impl Surroundings {
             .collect()
     }
 
-    /// Maps the given topics to sensors; returns the feeds. Only messages for profiling heads get their times from the
-    /// timestamps in their headers.
+    /// Maps the given topics to sensors, and returns the feeds of the import. Only messages for profiling heads get
+    /// their times from the timestamps in their headers.
     fn feeds(&self, topics: &[Topic]) -> Feeds {
         let there = TOPICS.iter().filter(|(name, _)| topics.iter().any(|topic| topic.name == *name));
         let text = there.fold(String::new(), |text, (topic, sensor)| {
@@ -152,7 +152,7 @@ pub(crate) fn try_one(
         return Ok(());
     }
     // The log reports no loss. It must therefore contain all messages of one of the intact logs. It may also contain
-    // parts of others.
+    // parts of other intact logs.
     let holds =
         |whole: &Said| whole.iter().all(|(message, count)| said.get(message).is_some_and(|got| got >= count));
     if corpus.said.iter().any(holds) {
@@ -162,7 +162,7 @@ pub(crate) fn try_one(
     }
 }
 
-/// Whether every checksum is present. A checksum of zero counts as missing. Without one, a changed byte can't be
+/// Whether every checksum is present. A checksum of zero counts as missing. Without a checksum, a changed byte can't be
 /// detected.
 fn is_vouched_for(log: &[u8]) -> bool {
     let mut rest = &log[8..];
@@ -261,8 +261,8 @@ fn from_viewer(bytes: &[u8]) -> Result<u64, String> {
 /// Largest number of lines in the list of a file's errors, including the line that says that there are more.
 const MOST_ERRORS: usize = 101;
 
-/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the reader's list of the errors in the file
-/// is itself faulty.
+/// Reads a vehicle file or a scene; returns its number of sensors. Errors: the list of errors that the reader returns
+/// is faulty.
 fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     let Ok(text) = str::from_utf8(bytes) else { return Ok(0) };
     let document = Document::new("file", text);
@@ -286,11 +286,11 @@ fn written_by_people(kind: Kind, bytes: &[u8]) -> Result<u64, String> {
     }
 }
 
-/// Imports a file into a log, and checks that this log is intact.
+/// Imports a file into a log, and checks that the log is intact.
 fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
     let format: Box<dyn Format> = match kind {
-        // Among these kinds of file, only ROS recordings have an importer. All of them are therefore imported as if
-        // they were ROS recordings.
+        // Of the kinds in this arm, only ROS recordings have an importer. Files of all these kinds are therefore
+        // imported as if they were ROS recordings.
         Kind::Log | Kind::Mcap | Kind::Vehicle | Kind::Scene | Kind::Line | Kind::Console | Kind::Viewer => {
             let Ok(recording) = Mcap::open("file", Cursor::new(bytes)) else { return 0 };
             let feeds = around.feeds(&recording.topics());

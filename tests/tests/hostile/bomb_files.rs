@@ -194,7 +194,7 @@ fn oversized_files_are_refused_with_the_limit() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The files contain long lists of names with one letter, which need the most memory per byte.
+/// The files contain long lists of one-letter names, because such lists need the most memory per byte.
 #[test]
 fn dbc_files_of_any_length_stay_within_the_memory_limit() {
     let folder = Folder::new();

@@ -9,7 +9,7 @@ use crate::records::{
 pub(crate) struct Bomb {
     pub(crate) name: &'static str,
     pub(crate) bytes: Vec<u8>,
-    /// Words that the report of a replay must contain. A `|` separates alternatives.
+    /// Words that the report of a replay must contain. A `|` separates alternatives, one of which must occur.
     pub(crate) expected_text: &'static str,
 }
 
@@ -191,7 +191,7 @@ fn headers() -> Vec<Bomb> {
 fn pointers() -> Vec<Bomb> {
     let some = |records: &[Vec<u8>]| log(&[&[depth()], records, &[message(1, 5, b"a")]].concat());
     let index = |count: u32| record(7, &[&[1, 0][..], &count.to_le_bytes(), &[0; 64]].concat());
-    // An attachment that claims 2^64-1 bytes in a record of 2 KiB.
+    // The attachment claims to have 2^64-1 bytes, but its record has 2 KiB.
     let endless = [&[0; 16][..], &text("endless"), &text(""), &u64::MAX.to_le_bytes(), &[0; 2000]].concat();
     let nameless =
         [&[0; 16][..], &text(&"n".repeat(3000)), &text(""), &5_u64.to_le_bytes(), b"hello", &[0; 4]].concat();

@@ -1,5 +1,5 @@
-//! Names from outside the program may contain terminal control codes. These codes are escaped on the display, so that
-//! each name stays on a single line.
+//! Names from outside the program may contain terminal control codes. The program escapes these codes on the display,
+//! so that each name stays on a single line.
 
 use headrace_tests::{Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;

@@ -1,4 +1,4 @@
-//! Hostile and broken input: every command ends within bounded memory and reports the parts that it couldn't read.
+//! Hostile and broken input: every command ends, uses bounded memory, and reports the parts that it couldn't read.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -9,7 +9,7 @@ pub(crate) fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode], (body.len() as u64).to_le_bytes().as_slice(), body].concat()
 }
 
-/// A string as MCAP stores it: its length, and then its bytes.
+/// A string as MCAP stores it: first its length, and then its bytes.
 pub(crate) fn text(text: &str) -> Vec<u8> {
     [&u32::try_from(text.len()).unwrap().to_le_bytes(), text.as_bytes()].concat()
 }
@@ -47,7 +47,7 @@ pub(crate) fn attachment(name: &str, data: &[u8]) -> Vec<u8> {
     record(9, &[&head, data, &[0; 4]].concat())
 }
 
-/// A chunk that states the unpacked size `unpacked`. The times of its messages lie within `times`.
+/// A chunk that states the unpacked size `unpacked`. It states `times` as the times of its first and last messages.
 pub(crate) fn chunk(packing: &str, unpacked: u64, packed: &[u8], times: (u64, u64)) -> Vec<u8> {
     let numbers = [times.0, times.1, unpacked].map(u64::to_le_bytes).concat();
     let len = (packed.len() as u64).to_le_bytes();
@@ -93,7 +93,7 @@ pub(crate) fn zstd(window_log: u8, parts: &[Part<'_>]) -> Vec<u8> {
             }
         }
     }
-    // These bytes are the header of an empty last block, which ends the zstd frame.
+    // These bytes are the header of an empty block that is marked as the last one. It ends the zstd frame.
     frame.extend([1, 0, 0]);
     frame
 }

@@ -1,4 +1,4 @@
-//! Seeks in odd logs. After a seek back, the reader must not know channels that are only defined later in the log.
+//! Seeks in odd logs. After a seek back, the reader must not know channels that are defined later in the log.
 
 use std::io::Cursor;
 
@@ -22,7 +22,7 @@ fn with_a_late_channel() -> Vec<u8> {
 }
 
 /// Reads a log from the present position to its end. Returns the messages, and all losses that the reader has reported
-/// so far.
+/// since it was created.
 fn rest(log: &mut LogReader<Cursor<Vec<u8>>>) -> (Vec<Vec<u8>>, Vec<String>) {
     let mut messages = Vec::new();
     while let Some(message) = log.next().unwrap() {

@@ -18,7 +18,7 @@ const READING: [&[&str]; 7] = [
     &["recover", "odd.mcap", "-o", "recovered.mcap", "--force"],
 ];
 
-/// Computes a message's new timestamp from the message's number and old timestamp.
+/// Function that computes a message's new timestamp from the message's number and old timestamp.
 type Stamp<'a> = &'a dyn Fn(u64, u64) -> u64;
 
 /// Writes a copy of the short dive's log, with timestamps from `stamp`.

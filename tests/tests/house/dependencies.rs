@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::workspace::root;
 
-/// Names of linked libraries that are written in other languages.
+/// Names (Cargo's key `links`) of the libraries in other languages that packages in the lock file link.
 const FOREIGN_LIBRARIES: [&str; 4] = ["hidapi", "lz4", "ring_core_0_17_14_", "zstd"];
 /// Crates in the lock file that are never built, because only programs in web pages need them.
 const NEVER_BUILT: [&str; 1] = ["wasm_bindgen"];
@@ -29,7 +29,7 @@ fn locked_dependencies(lock_file: &str) -> BTreeMap<String, BTreeSet<String>> {
     let text = std::fs::read_to_string(root().join(lock_file)).unwrap();
     let lock: toml::Table = toml::from_str(&text).unwrap();
     let ours = lock["package"].as_array().unwrap().iter().filter(|package| package.get("source").is_none());
-    // If the lock file has several versions of a dependency, it lists the dependency as "name version".
+    // If the lock file has several versions of a dependency, an entry for the dependency is "name version".
     let name = |entry: &toml::Value| entry.as_str().unwrap().split(' ').next().unwrap().to_owned();
     let dependencies = |package: &toml::Value| {
         package.get("dependencies").map_or_else(Vec::new, |list| list.as_array().unwrap().clone())
@@ -115,7 +115,8 @@ fn crates_come_from_the_registry_or_this_tree() {
     }
 }
 
-/// If the lock file of `lab/` is out of date, builds with `--locked` fail, and builds without it change the file.
+/// If the lock file of `lab/` is out of date, builds with `--locked` fail, and builds without this option change the
+/// file.
 #[test]
 fn lock_file_of_the_lab_lists_the_dependencies_of_the_product() {
     let lab = locked_dependencies("lab/Cargo.lock");
@@ -140,7 +141,7 @@ fn foreign_libraries_are_listed() {
     assert_eq!(linked, known.collect());
 }
 
-/// `deploy/sbom` must list exactly the parts that the program links, each with licence and checksum.
+/// `deploy/sbom` must list exactly the parts that the program links, and each with its licence and checksum.
 #[test]
 fn bill_of_materials_lists_exactly_the_linked_crates() {
     let Ok(output) = Command::new("python3").arg(root().join("deploy/sbom")).current_dir(root()).output()

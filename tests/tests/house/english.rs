@@ -119,7 +119,7 @@ fn documents_stay_within_their_length_limits() {
     assert!(changelog <= CHANGELOG_LINES, "{changelog} lines in CHANGELOG; at most {CHANGELOG_LINES}");
 }
 
-/// Words that aren't English, or that had a meaning in this project only.
+/// Words that aren't English, or that once had a meaning in this project only.
 const PRIVATE: [&str; 4] = ["meaned", "surer", "give or take", "overmuch"];
 
 /// Reason why a sentence of a comment or document needs a second reading; `None` if no rule finds one.
@@ -164,7 +164,7 @@ fn comments(text: &str) -> Vec<(usize, String)> {
 fn comments_and_documents_have_no_awkward_sentence() {
     let mut faults = Vec::new();
     for file in files(&["rs", "ts", "tsx"]) {
-        // This file contains the awkward words themselves.
+        // This file is skipped because it contains the awkward words themselves.
         if file.ends_with("english.rs") {
             continue;
         }
@@ -195,7 +195,7 @@ fn awkward_name(name: &str) -> Option<&'static str> {
     if ["of", "where", "when", "while", "without", "with"].contains(&parts[0]) {
         return Some("begins with no subject");
     }
-    // A single `s` after a number is the unit seconds: 2_s.
+    // A single `s` after a number is no possessive but the unit seconds, as in 2_s.
     let possessive =
         parts.windows(2).any(|pair| pair[1] == "s" && pair[0].parse::<f64>().is_err() && pair[0] != "per");
     possessive.then_some("has a possessive")

@@ -32,17 +32,17 @@ type Module = Vec<String>;
 
 #[derive(Debug, Default)]
 struct Content {
-    /// Files of the module: usually one, but several if Cargo features choose between them.
+    /// Files of the module: usually one, but several if a Cargo feature determines which of them is used.
     files: Vec<PathBuf>,
     children: Vec<Module>,
     used: Vec<Used>,
 }
 
-/// All modules of a crate that have their own files.
+/// All modules of a crate that have files of their own.
 #[derive(Debug, Default)]
 struct Sources(BTreeMap<Module, Content>);
 
-/// Files that depend on each other, sorted by name.
+/// An import cycle: files that depend on each other, sorted by name.
 #[derive(Debug, PartialEq, Eq)]
 struct Circle {
     files: Vec<PathBuf>,
@@ -147,7 +147,8 @@ impl Sources {
     }
 }
 
-/// Strongly connected components of a graph: largest sets of nodes in which each reaches all others (Tarjan 1972).
+/// Strongly connected components of a graph: the largest sets of nodes in which each node reaches all others (Tarjan
+/// 1972).
 fn components<N: Ord + Clone>(graph: &BTreeMap<N, BTreeSet<N>>) -> Vec<BTreeSet<N>> {
     let mut search = Search { graph, seen: BTreeMap::new(), stack: Vec::new(), found: Vec::new() };
     for node in graph.keys() {

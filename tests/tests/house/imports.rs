@@ -1,6 +1,6 @@
 //! Reads the declarations and imports of a Rust file from its tokens, to find the files on which the file depends.
 
-/// A token of Rust, in as much detail as imports require.
+/// A token of Rust, in as much detail as is needed to find imports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Token<'a> {
     Word(&'a str),
@@ -42,7 +42,7 @@ pub(crate) struct Imports {
 pub(crate) fn imports(text: &str) -> Imports {
     let tokens = tokens(text);
     let mut found = Imports::default();
-    // The inline modules around the current token, each with the brace depth outside it.
+    // The inline modules around the current token, each with the number of open braces outside it.
     let mut around: Vec<(&str, usize)> = Vec::new();
     let (mut depth, mut at) = (0_usize, 0);
     while at < tokens.len() {
@@ -71,7 +71,7 @@ pub(crate) fn imports(text: &str) -> Imports {
                     }
                 }
             }
-            // A module in a macro definition whose name is an argument of the macro.
+            // The name of this module in a macro definition is an argument of the macro.
             [Word("mod"), Mark('$'), Word(name), Mark('{'), ..] => {
                 around.push((name, depth));
                 depth += 1;
@@ -172,7 +172,7 @@ fn tree<'a>(tokens: &[Token<'a>], around: &[&'a str], leaves: &mut Vec<Vec<&'a s
             });
             parts.for_each(|part| tree(part, &path, leaves));
         }
-        // `self` and a glob both mean the module itself.
+        // `self` and a glob both stand for the module whose path comes before them.
         [Word("self"), ..] | [Mark('*')] => leaves.push(path),
         [Word(word), ..] => leaves.push([path, vec![word]].concat()),
         _ => {}

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use crate::workspace::{Package, root, sources, workspace};
 
-/// Crates of the core, from bottom to top. Each crate may only use crates before it.
+/// Crates of the core, from bottom to top. Each crate may use only the crates listed before it.
 const CORE: [&str; 8] =
     ["config", "geometry", "sampling", "sensor", "fusion", "coverage", "vehicle", "monitor"];
 
 /// Crates of the core that the crate of a device may use.
 const FOR_DEVICES: [&str; 1] = ["sensor"];
 
-/// Crates that the ports crate may use. The ports crate connects devices with the loop.
+/// Crates of the core that the ports crate may use. The ports crate connects devices with the loop.
 const FOR_PORTS: [&str; 3] = ["sensor", "geometry", "monitor"];
 
 /// Each crate in `replay/`, with the crates of `replay/` and the plugins that it may use in addition to the core.
@@ -44,8 +44,8 @@ const BARRED_FROM_CORE: [&str; 13] = [
     "mpsc",
 ];
 
-/// The crate that lists all device kinds. It may use the crates of all devices, and the crates of the core that these
-/// may use.
+/// The crate that lists all device kinds. It may use the crates of all devices, and the crates of the core that device
+/// crates may use.
 const DEVICES: &str = "plugins/devices";
 
 /// Rust packages in the workspace `lab`.
@@ -75,7 +75,7 @@ fn may_need(place: &Path, needed: &Path) -> bool {
             let others = others.unwrap_or_else(|| panic!("{} has no layer", place.display()));
             core(needed).is_some() || others.iter().any(|other| needed == Path::new(other))
         }
-        // The program may use every library, but no test package.
+        // The headrace program may use every library, but no package for tests.
         "" => !needed.starts_with("tests"),
         "tests" => true,
         _ => panic!("{} has no layer", place.display()),
@@ -197,14 +197,14 @@ fn versions_and_lints_are_only_in_the_root_manifest() {
 fn documents_in(text: &str) -> impl Iterator<Item = &str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || "_-./".contains(c);
     text.split(move |c: char| !is_part(c)).map(|word| word.trim_end_matches('.')).filter(|word| {
-        // The extension is split here, so that this file itself seems to name no document.
+        // The extension is split here, so that the text of this file doesn't seem to name a document.
         word.strip_suffix(["m", "d"].concat().as_str())
             .and_then(|stem| stem.strip_suffix('.'))
             .is_some_and(|stem| !stem.is_empty())
     })
 }
 
-/// All files below a folder that people read or edit, without build output.
+/// Adds all files below a folder that people read or edit. Build output doesn't belong to them.
 fn readable(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display())) {
         let path = entry.unwrap().path();

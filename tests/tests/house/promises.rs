@@ -2,7 +2,7 @@
 
 use crate::workspace::root;
 
-/// Checks that every test that the rows of a page name exists. Returns the number of rows that name tests.
+/// Checks that each test exists that a row of the page names. Returns the number of rows that name tests.
 fn count_named_tests(page: &str) -> usize {
     let page = std::fs::read_to_string(root().join(page)).unwrap();
     assert!(page.lines().count() < 150);

@@ -1,4 +1,4 @@
-//! Validation: foreign logs become headrace logs, which the ordinary decoders read.
+//! Validation: foreign logs are imported as headrace logs, and the ordinary decoders read them.
 //!
 //! `recordings/` has trimmed recordings made by others. If `HEADRACE_RECORDINGS` is set, these recordings are also read
 //! at full length.
@@ -57,7 +57,7 @@ fn refused(folder: &Folder, arguments: &[&str], words: &[&str]) {
     assert!(!folder.path("out.mcap").exists(), "a refused file leaves no log");
 }
 
-/// Expected counts for a telemetry log: intact entries, and messages for the vehicle's sensors.
+/// Expected counts for a telemetry log: number of intact entries, and numbers of messages for the vehicle's sensors.
 struct Telemetry {
     entries: u64,
     attitude: u64,
@@ -79,8 +79,7 @@ fn check_telemetry(file: &str, wanted: &Telemetry) {
     let folder = Folder::new();
     folder.write("vehicle.toml", format!("{TUNNEL}{AUTOPILOT}"));
     let answer = folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "-o", "out.mcap", "--json"]);
-    // Four frames of a camera have checksums that match no message definition. The exit code is 3, because data is
-    // lost.
+    // Four frames of a camera have checksums that match no message definition. They are lost, so the exit code is 3.
     assert_eq!(answer.code, Some(3), "{}", answer.stderr);
     let shown = json(&answer);
     assert!(answer.stderr.contains("4 times"), "{}", answer.stderr);
@@ -284,8 +283,8 @@ fn imported_table_becomes_the_bytes_of_its_sensors() {
 
 /// Faulty rows are reported, and none of their values is assigned to a wrong column.
 ///
-/// Faults are truncated rows, decimal commas beside separators, and ranges beyond the setting. A byte order mark before
-/// the header is no fault.
+/// The faults are truncated rows, decimal commas in a file with commas as separators, and ranges beyond the head's
+/// setting. A byte order mark before the header is no fault.
 #[test]
 fn rows_that_contradict_the_header_are_skipped_and_reported() {
     let folder = Folder::new();

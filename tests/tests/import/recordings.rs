@@ -27,8 +27,8 @@ struct Wanted {
     roll: [f64; 2],
     pitch: [f64; 2],
     yaw: [f64; 2],
-    /// Number of accelerometer readings (specific force). The gyros have the same number of readings, and so has the
-    /// first pressure sensor.
+    /// Number of accelerometer readings (specific force). The gyros and the first pressure sensor have the same number
+    /// of readings.
     forces: usize,
     mean_force_g: f64,
     /// Number of readings of the second pressure sensor.
@@ -85,7 +85,7 @@ fn readings(path: &Path, frames: u64, part: Part) -> (Vec<Decoded>, MavlinkDecod
     (readings, decoder)
 }
 
-/// Smallest value, largest value and mean.
+/// Smallest value, largest value and mean of the values.
 fn spread(values: impl Iterator<Item = f64>) -> (f64, f64, f64) {
     let (mut least, mut most, mut sum, mut count) = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0);
     for value in values {
@@ -138,7 +138,7 @@ fn check_imu(path: &Path, wanted: &Wanted) {
     assert!(up.1 < 6.0 && up.2 < 2.0, "{up:?}");
 }
 
-/// Angle between the measured force and the upward direction by the latest attitude, degrees.
+/// Angle between the measured force and the upward direction, which follows from the latest attitude, degrees.
 ///
 /// While the vehicle hardly moves, this angle is small if the axes of both measurements are right.
 fn up(

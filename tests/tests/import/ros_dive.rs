@@ -54,7 +54,7 @@ impl Cdr {
     }
 }
 
-/// Topic, type and content of the ROS message that a device's message becomes; `None` if it becomes none.
+/// Topic, type and content of the ROS message that is made of a device's message; `None` if none is made.
 type Written = Option<(String, &'static str, Cdr)>;
 
 struct Translator {

@@ -45,7 +45,8 @@ fn import(folder: &Folder, file: &str, map: &str) -> Answer {
     folder.headrace(&["import", file, "--vehicle", "vehicle.toml", "--map", map, "-o", "out.mcap", "--json"])
 }
 
-/// A message of an imported log: topic, time in nanoseconds since 1970 (by the clock metadata of the log), and bytes.
+/// A message of an imported log: topic, time in nanoseconds since 1970 (computed with the log's clock metadata), and
+/// bytes.
 type Heard = (String, u64, Vec<u8>);
 
 fn heard(folder: &Folder) -> Vec<Heard> {
@@ -145,7 +146,7 @@ fn stamps_in_another_time_base_are_reported_and_usable_on_request() {
     assert!(!answer.stderr.contains("/cable"), "{}", answer.stderr);
     let recorded = heard(&folder);
     assert_eq!(of(&followed, "/raw/imu"), of(&recorded, "/raw/imu"));
-    // A scan's timestamp is the time of its first beam, but the scan is recorded when its last beam is complete.
+    // A scan has the time of its first beam as its timestamp, but it is recorded only when its last beam is complete.
     assert_eq!(import(&folder, "humble.mcap", "header.toml").code, Some(0));
     assert_eq!(of(&heard(&folder), "/raw/sonar_0"), of(&recorded, "/raw/sonar_0"));
     let answer = import(&folder, "boot_time.mcap", "header.toml");
@@ -233,7 +234,7 @@ fn wrong_mappings_are_refused() {
     );
 }
 
-/// Imports a file after `change` has modified its bytes. Returns exit code and output.
+/// Imports a file after `change` has modified its bytes. Returns exit code and output of the import.
 fn changed(folder: &Folder, name: &str, change: impl FnOnce(&mut Vec<u8>)) -> (Option<i32>, String) {
     let mut bytes = fixture(name);
     change(&mut bytes);
@@ -365,7 +366,8 @@ fn recording(messages: &[(&str, &str, u64, Vec<u8>)]) -> Vec<u8> {
     file.into_inner()
 }
 
-/// A message of encapsulation, a timestamp equal to the record's time, a frame name of three letters, and doubles.
+/// A message that consists of the encapsulation, a timestamp equal to the record's time, a frame name of three letters,
+/// and doubles.
 fn stamped(seconds: u32, frame: &str, values: &[f64]) -> Vec<u8> {
     let head = [&[0, 1, 0, 0][..], &(1_700_000_000 + seconds).to_le_bytes(), &[0; 4], &[4, 0, 0, 0]].concat();
     let values: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();

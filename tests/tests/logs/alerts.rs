@@ -1,4 +1,4 @@
-//! Alerts and operator commands are the same for any tick length, in replay and in `verify`.
+//! Alerts and operator commands are the same for any tick length, in a replay and in `verify`.
 //!
 //! Commands change no result except the alerts.
 
@@ -16,7 +16,8 @@ use headrace_simulator::{START, Scene, Simulation};
 use headrace_tests::{Folder, scenes};
 use serde_json::Value;
 
-/// The vehicle is fast over a stretch and then goes back over a part of it. A head dies and recovers.
+/// The vehicle is fast over a stretch and then goes back over a part of this stretch. During the dive, a head dies and
+/// recovers.
 const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 10\nspeed_mps = 0.18\n
 [[trajectory.legs]]\ndistance_m = 8\nspeed_mps = 0.4\n
@@ -142,7 +143,7 @@ fn tick_boundaries_do_not_change_alerts_and_commands() {
     for change in ["raised", "acknowledged", "silenced", "rectified", "cleared", "changed"] {
         assert!(done.iter().any(|done| done.as_str() == change), "{change}");
     }
-    // Once the condition of an alert is over, the alert requires no action.
+    // Alerts whose condition is over are expected to require no action.
     let around = expected.view().surroundings();
     let asks = |alert: &&ListedAlert| !alert.advice(&around).is_empty();
     let (holding, over): (Vec<_>, Vec<_>) =
@@ -208,7 +209,7 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
             changes.iter().filter(|(_, change, alert)| *change == AlertChange::Raised && alert.kind == kind);
         raised.map(|(at, ..)| at.since(START).as_secs_f64()).collect()
     };
-    // On the way back any speed is allowed, so the second too-fast alert follows only after the way back.
+    // On the way back any speed is allowed, so the second too-fast alert is raised only after the way back.
     let too_fast = raised(ListKind::TooFast);
     assert!(matches!(too_fast[..], [first, again] if first < 10.0 && again > 100.0), "{too_fast:?}");
     // After the fast stretch, the too-fast alert still shows the speed that was too fast, not the later, lower speed.
@@ -218,8 +219,8 @@ fn too_fast_stretch_and_dead_head_are_alerted_once_and_in_time() {
     let [silent_s] = raised(ListKind::SensorSilent)[..] else {
         panic!("{:?}", raised(ListKind::SensorSilent))
     };
-    // The alert for the dead head is raised 2 s after the head's last reading, at the next update. No latch time is
-    // configured.
+    // The alert for the dead head is raised 2 s after the head's last reading, at the next update. No latch time delays
+    // the alert, because none is configured.
     assert!((DIES_S + 1.5..DIES_S + 2.3).contains(&silent_s), "{silent_s}");
     let head = dive.view().alert_list().iter().find(|alert| alert.kind == ListKind::SensorSilent).unwrap();
     assert_eq!(dive.sources()[head.source.unwrap().index()].id, "sonar_1");
@@ -340,7 +341,7 @@ fn recorded_acknowledgements_are_equal_in_replay_and_verify() {
     let lines = folder.headrace(&["replay", "live.mcap", "--json-lines"]).stdout;
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     let of = |kind: &str| lines.iter().filter(|line| line["type"] == kind).cloned().collect::<Vec<_>>();
-    // The list also has the voice note a second time, with its duration.
+    // The list has the voice note twice: at its start, and again with its duration.
     assert_eq!(of("note").len(), 4);
     assert!(of("alert_change").iter().any(|line| line["change"] == "acknowledged"));
     let states = of("state");
@@ -375,7 +376,7 @@ fn make_late(id: &str, bytes: &mut Vec<u8>) {
     }
 }
 
-/// Gives a CAN frame an id that no message of the inertial unit has.
+/// Changes the id of a CAN frame to an id that no message of the inertial unit has.
 #[expect(clippy::ptr_arg, reason = "the type of all changes")]
 fn make_foreign(id: &str, bytes: &mut Vec<u8>) {
     if id == "imu" {
@@ -405,12 +406,13 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     );
     assert!((sent - 3..=sent).contains(&count), "{count} of {sent}");
     assert_eq!(action, "restart it");
-    // An alert that a sensor is silent would contradict the alert about withheld readings.
+    // An alert that a sensor is silent would contradict the alert about withheld readings, so there must be none.
     let of_sensors = changes.iter().filter(|(.., alert)| alert.kind == ListKind::SensorSilent).count();
     assert_eq!(of_sensors, 0);
     let state = late.view().live_state_json();
     let dvl = state.sensors.iter().find(|sensor| sensor.id == "dvl").unwrap();
-    // The numbers of readings differ, because the live state also counts reports since the last update of the alerts.
+    // The text after the number is compared. The numbers differ, because the live state also counts reports since the
+    // last update of the alerts.
     let after = dvl.withheld.as_ref().unwrap().split_once(' ').unwrap().1;
     assert_eq!((dvl.state.as_str(), after), ("withheld", text.splitn(3, ' ').nth(2).unwrap()));
     let report = Report::of(&late);
@@ -427,7 +429,7 @@ fn velocity_log_that_is_15_s_late_is_alerted_with_reason_and_number() {
     }
 }
 
-/// The test tries several rates, because the first withheld report comes one period after the last reading.
+/// The test tries several rates, because the time from the last reading to the first withheld report is one period.
 #[test]
 fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
     for keep_one_of in [1, 5, 10] {
@@ -451,7 +453,8 @@ fn velocity_log_that_becomes_late_during_the_dive_is_never_called_silent() {
     }
 }
 
-/// Without any reading, only commands that state the time make the loop's time advance, so that alerts can be raised.
+/// Without any reading, only operator commands, which state the time, make the loop's time advance, so that alerts can
+/// be raised.
 #[test]
 fn can_frames_without_a_known_id_are_alerted_although_no_sensor_has_a_reading() {
     let (scene, mut packets) = withheld_dive(make_foreign);

@@ -11,7 +11,7 @@ const TICKS_MS: [&str; 6] = ["1", "5", "20", "100", "777", "60000"];
 
 /// Runs `work` while `threads` threads keep the cores busy.
 fn while_busy<T>(threads: usize, work: impl FnOnce() -> T) -> T {
-    /// Ends the busy threads when this value is dropped, even if `work` panics.
+    /// Ends the threads that keep the cores busy when this value is dropped, even if `work` panics.
     struct Stop<'a>(&'a AtomicBool);
     impl Drop for Stop<'_> {
         fn drop(&mut self) {
@@ -51,7 +51,8 @@ fn live_dive_and_its_replay_have_the_same_digest() {
     );
 }
 
-/// In this dive, fails become final, later passes clear flags, and verdicts depend on earlier verdicts.
+/// The dive of this test has fails that become final, flags that later passes clear, and verdicts that depend on
+/// earlier verdicts.
 #[test]
 fn tick_length_does_not_change_failed_and_cleared_sections() {
     let folder = Folder::new();

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 /// Dive times of the notes, s. The first one comes before the first sensor packet.
 const NOTES_S: [f64; 3] = [-5.0, 3.0, 20.25];
 
-/// Writes `notes.mcap`: the short dive with these notes, at another place on the log's clock.
+/// Writes `notes.mcap`: the short dive with the notes [`NOTES_S`], shifted in time on the log's clock.
 fn with_notes(folder: &Folder) -> u64 {
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);
@@ -69,7 +69,7 @@ fn times_in_arguments_count_from_the_first_sensor_packet() {
     let first = raw_messages(&part)[0].log_time;
     assert!((10_000_000_000..10_100_000_000).contains(&(first - begun)), "{} ns", first - begun);
     assert!(answer.stdout.contains("messages, 10.0"), "{}", answer.stdout);
-    // The extract is a dive of its own, and begins with its first sensor packet.
+    // The extract is a dive of its own, so its dive time begins with the first sensor packet of the extract.
     let (_, report) = folder.replay("part.mcap", &[]);
     let note_s = times_s(&report["notes"])[0];
     assert!((note_s - (20.25 - (first - begun) as f64 * 1e-9)).abs() < 1e-6, "{note_s}");

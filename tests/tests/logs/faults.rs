@@ -29,8 +29,8 @@ fn has_strace() -> bool {
     can
 }
 
-/// Records a dive while strace injects this fault into system calls. The dive is long enough for several syncs. Returns
-/// exit code and report of the dive.
+/// Records a dive while strace injects the fault `fault` into system calls. The dive is long enough for several syncs.
+/// Returns exit code and report of the dive.
 fn with_fault(folder: &Folder, fault: &[&str], records: &[&str]) -> (Option<i32>, Value) {
     let strace = [&["strace", "-f", "-qq", "-o", "trace.txt"][..], fault].concat();
     let records: Vec<&str> = records.iter().flat_map(|record| ["--record", record]).collect();
@@ -71,7 +71,7 @@ fn single_failed_sync_is_reported_and_loses_nothing() {
     );
     assert!(folder.path("log.part002.mcap").exists());
     all_find_it(&folder, "log.mcap", "recording failed in log.mcap");
-    // Both parts of the recording replay under the recording's name and give the same dive as the original log.
+    // If the recording's name is given, both parts are replayed and give the same dive as the original log.
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
     assert_eq!(folder.replay("recovered.mcap", &[]).1["digest"], digest.as_str());
 }
@@ -182,7 +182,7 @@ fn file_size_limit_starts_another_part() {
     assert_eq!(folder.replay("log.mcap", &[]).1["digest"], digest.as_str());
 }
 
-/// Waits for a process that must end by itself.
+/// Waits for a process that must end by itself, and returns its exit code.
 #[track_caller]
 fn ended(mut child: Child) -> Option<i32> {
     for _ in 0..1200 {
@@ -294,7 +294,8 @@ fn live_dive_without_its_terminal_goes_on_until_a_signal() {
             // The program installs its signal handlers before it prints the first line.
             lines.next().unwrap().unwrap();
         } else {
-            // The first write to the log contains only the header, so the test also waits for later writes.
+            // The first write to the log contains only the header, so the test also waits until later writes have made
+            // the file longer.
             wait_for(&folder.path("log.mcap"), &mut dive);
             std::thread::sleep(Duration::from_secs(1));
         }
@@ -313,7 +314,7 @@ fn live_dive_without_its_terminal_goes_on_until_a_signal() {
     }
 }
 
-/// If another program removes the recording during the dive, this is reported at once and a new part begins. The
+/// Another program removes the recording during the dive. The loss is reported at once, and a new part begins. The
 /// removed data is lost.
 #[cfg(target_os = "linux")]
 #[test]
@@ -360,7 +361,7 @@ fn removed_recording_is_reported_and_continues_in_a_new_part() {
         let report: Value = serde_json::from_slice(&folder.read("report.json")).unwrap();
         assert_eq!(report["digest"], digest.as_str());
         assert!(losses(&report).contains(words), "{words}: {}", losses(&report));
-        // The second part of the recording has the rest of the data and states the loss before it.
+        // The second part of the recording has the rest of the data, and states that data before it was lost.
         let (code, rest) = folder.replay("log.part002.mcap", &[]);
         assert!(code == Some(3) && losses(&rest).contains(words), "{code:?}: {}", losses(&rest));
         // Each message of the dive is in the second part or counted as missing. On a disk with slow syncs, all may still
@@ -384,7 +385,7 @@ fn moved_recording_is_complete() {
     let mut dive = dive.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     wait_for(&folder.path("log.mcap"), &mut dive);
     std::fs::rename(folder.path("log.mcap"), folder.path("moved.mcap")).unwrap();
-    // The file was moved, so the recorder can't read it back by its old name. The report counts this as a loss.
+    // The file was moved, so the recorder doesn't find it under its old name. The report counts this as a loss.
     assert_eq!(dive.wait_with_output().unwrap().status.code(), Some(3));
     assert!(!folder.path("log.part002.mcap").exists());
     assert_eq!(folder.digest("moved.mcap", &[]), digest);

@@ -11,7 +11,7 @@ fn folder() -> PathBuf {
     headrace_tests::root().join("tests/golden")
 }
 
-/// Names of all files with an extension, sorted and without the extension.
+/// Names of all golden files with the extension `ending`, sorted and without the extension.
 fn names(ending: &str) -> Vec<String> {
     let entries = std::fs::read_dir(folder()).unwrap();
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.unwrap().file_name().into_string().unwrap();

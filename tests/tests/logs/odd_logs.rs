@@ -6,14 +6,14 @@ use headrace_tests::{Answer, Folder, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
 
 const WITH_VEHICLE: [&str; 2] = ["--vehicle", "vehicle.toml"];
-/// Nanoseconds from 1970 to a time in autumn 2026.
+/// UTC time at which the tests' clock is 0, ns since 1970. It is in autumn 2026.
 const UTC_OF_OUR_ZERO_NS: u64 = 1_790_000_000_000_000_000;
 
 fn replay(folder: &Folder, log: &str) -> Answer {
     folder.headrace(&[&["replay", log], &WITH_VEHICLE[..]].concat())
 }
 
-/// Lines of a replay's output with losses ("LOST") and notes about the log.
+/// Lines of a replay's output that state losses ("LOST") or are notes about the log.
 fn loss_lines(answer: &Answer) -> String {
     let odd = answer.stdout.lines().filter(|line| line.contains("LOST") || line.contains("note"));
     odd.fold(String::new(), |all, line| all + line.trim() + "\n")
@@ -35,7 +35,7 @@ fn messages_of_another_clock_are_skipped_and_reported() {
     insta::assert_snapshot!(loss_lines(&answer), @r#"LOST: 406 messages of source "depth" left out: their timestamps are 56.8 years after those of most messages"#);
 
     // The majority of messages decides which clock is right. The result is therefore the same if the messages with
-    // times of the other clock come first.
+    // times of the wrong clock come first.
     for message in &mut messages {
         message.log_time = match message.channel.topic.as_str() {
             "/raw/depth" => message.log_time - UTC_OF_OUR_ZERO_NS,

@@ -63,8 +63,8 @@ impl Outcome {
     }
 }
 
-/// A headrace log replays its packets in the order in which the live loop consumed them. This order can differ from the
-/// order of the receive times. A log without ticks replays in time order.
+/// A headrace log replays its packets in the order in which the live loop consumed them, which can differ from the
+/// order of their receive times. A log without ticks replays in time order.
 #[test]
 fn headrace_logs_replay_in_recorded_order_but_other_logs_in_order_of_time() {
     let folder = Folder::new();
@@ -99,8 +99,8 @@ fn headrace_logs_replay_in_recorded_order_but_other_logs_in_order_of_time() {
     }
 }
 
-/// Plays a log with these commands. A snapshot is made after each `interval` of computing time. Returns the stops and
-/// the result.
+/// Plays a log with these commands. Playback makes a snapshot after each `interval` of computing time. Returns the
+/// stops and the result.
 fn play(folder: &Folder, log: &str, commands: &[PlaybackCommand], interval: Duration) -> (Stops, Outcome) {
     let mut dive = armed(&vehicle());
     let mut player = Player::open(&files_of(&[folder.path(log)]).unwrap()).unwrap();
@@ -130,8 +130,8 @@ fn through(folder: &Folder, log: &str) -> (Vec<(MonoNs, u64, u64)>, Outcome) {
     (ticks, Outcome::of(&dive, &player))
 }
 
-/// A folder with logs of one dive in three forms: from the simulator, which replays by time; from the recorder, which
-/// replays by ticks; and from the recorder in several parts.
+/// A folder with logs of one dive in three forms: written by the simulator (replayed by time), by the recorder
+/// (replayed by ticks), and by the recorder in several parts.
 fn logs() -> Folder {
     let folder = Folder::with_dive();
     folder.record("dive.mcap", "ticks.mcap", &[]);
@@ -146,7 +146,8 @@ fn every_seek_reaches_the_state_of_a_straight_replay() {
     for log in ["dive.mcap", "ticks.mcap", "parts"] {
         let (ticks, outcome) = through(&folder, log);
         assert!(outcome.losses.is_empty(), "{:?}", outcome.losses);
-        // Seeks end before the last two ticks, because a single step from there reaches the end of the log.
+        // Seeks end before the last two ticks, because a single step from one of the last ticks reaches the end of the
+        // log.
         let (begun, late) = (ticks[0].0, ticks[ticks.len() - 3].0);
         let span = late.since(begun).0;
         for interval in [Duration::from_millis(5), Duration::from_millis(40), Duration::MAX] {
@@ -211,7 +212,7 @@ fn playback_waits_at_the_end_for_a_seek() {
 }
 
 /// Damages one byte in each of three chunks of a log. Two of these chunks are adjacent and in the middle of the log.
-/// The third one comes later.
+/// The third chunk comes later.
 fn damage(folder: &Folder, log: &str) {
     let mut bytes = folder.read(log);
     let mut chunks = Vec::new();
@@ -282,8 +283,8 @@ fn damage_seen_before_seeking_back_is_reported_at_the_end() {
         "pause\nseek 1h\nback 10s\nback 1h\nend\n",
         "pause\nseek 19s\nseek 1s\ngo\n",
     ] {
-        // Only the number of losses is compared. Their times may be known more exactly after the whole log has been
-        // read.
+        // Only the number of losses is compared, because their times may be known more exactly after the whole log has
+        // been read.
         let (code, listed) = losses(lines);
         assert_eq!((code, listed.as_array().unwrap().len()), (Some(3), 3), "{lines}: {listed}");
     }
@@ -302,7 +303,7 @@ fn replay_started_in_the_middle_reports_the_whole_dive() {
     assert_eq!(in_parts["log"]["messages"], whole["log"]["messages"]);
 }
 
-/// Runs `replay --interactive` with these lines on standard input.
+/// Runs `replay --interactive` with `lines` on standard input.
 fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     let mut program = headrace_tests::program()
         .args(["replay", "--interactive"])
@@ -317,8 +318,8 @@ fn interactive(folder: &Folder, arguments: &[&str], lines: &str) -> Output {
     program.wait_with_output().unwrap()
 }
 
-/// Other targets are judged in a second replay of the whole log. A replay that is stopped covers less of the dive, so
-/// its figures for the first target aren't comparable with theirs.
+/// Targets other than the first one are judged in a second replay of the whole log. A replay that was stopped covers
+/// less of the dive, so figures for the first target aren't comparable with figures for other targets.
 #[test]
 fn stopped_replay_reports_the_first_target_only() {
     let folder = logs();

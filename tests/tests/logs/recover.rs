@@ -98,13 +98,13 @@ fn logs_cut_or_changed_anywhere_give_the_documented_exit_codes() {
     assert!(lost > 20, "{lost} of 40");
 }
 
-/// Records the short dive on a small disk of this size, and then copies the log to another disk. Returns exit code,
+/// Records the short dive on a small disk of `kilobytes`, and then copies the log to another disk. Returns exit code,
 /// report and stderr. Returns `None` if the small disk can't be created.
 fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)> {
     std::fs::create_dir_all(folder.path("disk")).unwrap();
     let program = headrace_tests::program();
     let program = program.get_program().to_str().unwrap();
-    // The small disk is a private mount of the shell. It disappears when the shell ends.
+    // The small disk is mounted for the shell only, and disappears when the shell ends.
     let script = format!(
         "mount -t tmpfs -o size={kilobytes}k none disk || exit 99
         '{program}' run vehicle.toml --source dive.mcap --record disk/log.mcap --speed max --json > report.json 2> said.txt
@@ -121,8 +121,8 @@ fn on_a_disk_of(folder: &Folder, kilobytes: u32) -> Option<(i32, Value, String)>
 fn recording_drops_echoes_on_a_nearly_full_disk_and_ends_on_a_full_disk() {
     let folder = Folder::with_dive();
     let digest = folder.digest("dive.mcap", &[]);
-    // The first disk becomes nearly full, but has room for all small messages. The second disk has room for only a few
-    // seconds of the dive.
+    // The first disk in the list becomes nearly full, but has room for all small messages. The second disk has room for
+    // only a few seconds of the dive.
     for (kilobytes, words) in [(20_000, "echo returns"), (80, "recording failed")] {
         let Some((code, report, said)) = on_a_disk_of(&folder, kilobytes) else {
             headrace_tests::skipped("unshare and mount are not allowed here");
@@ -137,8 +137,8 @@ fn recording_drops_echoes_on_a_nearly_full_disk_and_ends_on_a_full_disk() {
         let losses = replayed["log"]["losses"].to_string();
         assert!(code == Some(3) && losses.contains("echo returns out"), "{code:?}: {losses}");
         if kilobytes > 1000 {
-            // These heads send only short messages, so all raw data is kept. Only the published results of pings are
-            // dropped.
+            // These heads send only short messages, so the recorder keeps all raw data. It drops only the published
+            // results of pings.
             assert_eq!(replayed["digest"], digest.as_str());
         }
     }

@@ -1,5 +1,5 @@
-//! A dive that was interrupted is rebuilt from its log. While it is rebuilt, new packets are only recorded. Afterwards
-//! the dive gives the same results as a dive that was not interrupted, bit for bit.
+//! A dive that was interrupted is rebuilt from its log. During the rebuilding, new packets are only recorded.
+//! Afterwards, the dive gives the same results as a dive that was not interrupted, bit for bit.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -59,7 +59,7 @@ fn record_and_cut(scene: &Scene, packets: &[Packet], log: &Path) -> usize {
     readable
 }
 
-/// A loop whose ports are still in it.
+/// A loop whose ports haven't been taken out yet.
 fn with_ports(scene: &Scene) -> Loop {
     let mut app = App::new(scene.vehicle.mission());
     for sensor in &scene.vehicle.sensors {
@@ -99,8 +99,8 @@ impl Interrupted {
         Self { scene, log, before, after, expected, digest }
     }
 
-    /// Continues the dive. `held` packets arrive while the dive is rebuilt. `waiting` packets are still in the rings
-    /// when the dive goes on.
+    /// Rebuilds the dive and continues it. `held` packets arrive during the rebuilding. `waiting` packets are still in
+    /// the rings when the dive goes on.
     fn resume(&self, held: usize, waiting: usize, saved: &Path) -> (Loop, Rebuilt) {
         let unfinished = Unfinished::read(&self.log).unwrap().unwrap();
         assert_eq!(unfinished.files, std::slice::from_ref(&self.log));

@@ -69,7 +69,8 @@ fn dive_in_parts_replays_and_verifies_as_one() {
     assert_eq!(answer.code, Some(0), "{}{}", answer.stdout, answer.stderr);
     assert_eq!(folder.digest("joined.mcap", &[]), whole["digest"].as_str().unwrap());
 
-    // One missing part is reported as a loss. If all parts except one are missing, each missing part is reported.
+    // A single missing part is reported as a loss. If all parts except one are missing, each missing part is reported
+    // as well.
     std::fs::remove_file(folder.path("parts/dive.part002.mcap")).unwrap();
     let (code, report) = folder.replay("parts", &[]);
     let losses = report["log"]["losses"].to_string();
@@ -148,8 +149,8 @@ fn dive_killed_between_parts_loses_at_most_one_second() {
         };
         assert_eq!(report["differences"], Value::Array(Vec::new()), "{name}: {report}");
         let lost = report["losses"].as_array().unwrap();
-        // After a kill, data may be lost from two parts of the log: the one that was being written, and one that had
-        // just begun.
+        // After a kill, data may be lost from two parts of the log: the part that was being written, and a part that
+        // had just begun.
         assert!(lost.len() <= 2, "{name}: {report}");
         assert!(lost.iter().all(|loss| !loss.as_str().unwrap().contains("missing")), "{name}: {report}");
         same += report["same_records"].as_u64().unwrap();

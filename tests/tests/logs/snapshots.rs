@@ -75,8 +75,8 @@ pub(crate) fn run((dive, ports): &mut (Loop, Vec<Port>), packets: &[Packet]) {
     }
 }
 
-/// Saves a dive at many moments. From each saved state, another loop runs to the next moment, and must reach the same
-/// state there.
+/// Saves a dive at many moments. From each saved state, another loop runs to the next moment, and must then have the
+/// same state as the first loop.
 fn goes_on_from_anywhere(scene: &Scene) {
     let packets = packets(scene);
     let (mut whole, mut other) = (armed(&scene.vehicle), armed(&scene.vehicle));
@@ -148,7 +148,7 @@ fn snapshot_with_autopilot_and_velocity_log_resumes_identically() {
     goes_on_from_anywhere(&small_vehicle(|_| headrace_tests::other_vehicle()));
 }
 
-/// A loop refuses to restore the saved state of another vehicle.
+/// A loop must refuse to restore the saved state of another vehicle.
 #[test]
 fn snapshot_of_another_vehicle_is_refused() {
     let two = small_vehicle(str::to_owned);

@@ -1,6 +1,6 @@
 //! Replays on several threads, and loops that share a navigation, give the same ticks as one thread, bit for bit.
 //!
-//! The ticks are the same whether the feed ends normally, with an error or by a panic.
+//! This also applies if the feed ends with an error or by a panic.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
@@ -71,8 +71,8 @@ impl PacketSource for Feed {
     }
 }
 
-/// A scene with four heads and back-and-forth motion. Sections fail, fails become final, and later passes clear them.
-/// An operator gives commands.
+/// A scene with four heads and back-and-forth motion, in which an operator gives commands. Sections fail, some fails
+/// become final, and later passes clear them.
 fn scene() -> Scene {
     scenes::scene(&format!("vehicle = \"vita2-4.toml\"\n{LEGS}{EFFECTS}"))
 }
@@ -120,7 +120,7 @@ fn dived(threads: usize, scene: &Scene, tick_ms: i64, packets: &[Packet], end: E
     let (mut ticks, tick) = (Vec::new(), DurNs::from_millis(tick_ms));
     let mut note = |dive: &Loop| ticks.push(of_tick(dive));
     let driven = match threads {
-        // Zero threads mean the plain function `drive`, whose result is the reference for `drive_on`.
+        // For zero threads, the function `drive` runs the dive. Its result is the reference for `drive_on`.
         0 => drive(&mut dive, &mut feed, Pace { tick, speed: None }, &mut note),
         threads => drive_on(threads, &mut dive, &mut feed, tick, &mut note),
     };
@@ -188,7 +188,7 @@ fn panicking_thread_gives_an_error_and_does_not_block_the_loop() {
             "{words}"
         );
     }
-    // If the caller's function panics, the panic is passed on and all threads end.
+    // If the caller's function panics, the panic must be passed on to the caller, and all threads must end.
     let mut feed = Feed { packets, next: 0, end: End::Last };
     let mut dive = armed(&scene.vehicle, None);
     let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
@@ -197,7 +197,7 @@ fn panicking_thread_gives_an_error_and_does_not_block_the_loop() {
     assert!(caught.is_err());
 }
 
-/// An outlet that falls behind at times. The loop must then hold packets back.
+/// An outlet that falls behind at times. Whenever it does, the loop must hold packets back.
 #[derive(Clone, Default)]
 struct Behind(Arc<AtomicU64>);
 
@@ -215,8 +215,8 @@ impl Outlet for Behind {
     }
 }
 
-/// A plugin that adds a system to the placer (the part of the loop that places pings) and counts the packets that the
-/// system sees.
+/// A plugin that adds a system to the placer, which is the part of the loop that places pings. It counts the packets
+/// that the system sees.
 struct Placing;
 
 #[derive(Resource, Default)]

@@ -1,5 +1,5 @@
-//! Trimmed logs. If nothing is cut off, they contain the same dive. Otherwise they keep the verdicts of the stretch
-//! that is left. Anonymous logs contain no names.
+//! Trimmed logs. If nothing is cut off, a trimmed log contains the same dive. Otherwise it keeps the verdicts of the
+//! stretch that is left. Anonymous logs contain no names.
 
 use headrace_tests::{Folder, SCENE, VEHICLE, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -102,7 +102,7 @@ fn trimmed_log_states_the_cut_and_keeps_the_verdicts_inside() {
 
 #[test]
 fn trim_removes_echoes_and_keeps_ranges() {
-    // The heads in this dive send their echo (252 bytes) with each range.
+    // The heads' messages are replaced by longer ones, which have the echo (252 bytes) with each range.
     let folder = recorded(headrace_tests::SCENE, VEHICLE);
     let dive = folder.read("dive.mcap");
     let mut messages = raw_messages(&dive);

@@ -34,7 +34,7 @@ fn verify_passes_at_any_tick_length() {
 #[test]
 fn verify_reports_a_tiny_mount_change_with_tick_sensor_field_and_bits() {
     let folder = recorded();
-    // The mount's angle of 1e-13 degrees moves a sample's position by about two units in the last place. `verify` names
+    // Turning the mount by 1e-13 degrees moves a sample's position by about two units in the last place. `verify` names
     // the sensor.
     let other = VEHICLE.replacen("mode = \"fastest\"", "mode = \"fastest\"\nangles_deg = [0, 0, 1e-13]", 1);
     folder.write("other.toml", other);

@@ -53,7 +53,7 @@ zero_at_m = {zero_at_m}
     )
 }
 
-/// The vehicle file that headrace reads. The mounts of the simulated vehicle may differ from it.
+/// The vehicle file that headrace reads. The simulated vehicle may have mounts that differ from this file.
 fn filed() -> String {
     vehicle("position_m = [0.1, 0, 0]", "position_m = [-0.1, 0, 0]\nangles_deg = [0, 0, 180]", 0.0)
 }
@@ -97,8 +97,8 @@ fn found<'a>(report: &'a Value, of: &str, what: &str) -> &'a Value {
         .unwrap_or_else(|| panic!("{of} {what}: {report:#}"))
 }
 
-/// Checks that the latency found by `calibrate` differs from the truth by at most three reported standard deviations,
-/// and by less than `most_ms`.
+/// Checks that the latency found by `calibrate` differs from the truth by at most three of its reported standard
+/// deviations, and by less than `most_ms`.
 #[track_caller]
 fn assert_latency(report: &Value, of: &str, truth_ms: f64, most_ms: f64) {
     let row = found(report, of, "latency");
@@ -182,8 +182,8 @@ fn calibrate_finds_only_the_late_head() {
     let answer = folder.headrace(&["calibrate", "dive.mcap", "--json"]);
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     let report: Value = serde_json::from_str(&answer.stdout).unwrap();
-    // A head answers before its next ping, so a latency of 32 ms or more isn't allowed in the vehicle file. The latency
-    // that is found here is longer, so no line is proposed.
+    // A head answers before its next ping, so the vehicle file may not state a latency of 32 ms or more. The latency
+    // found here is longer, so `calibrate` proposes no line.
     let untold = report["untold"].as_array().unwrap();
     let why = untold.iter().find(|row| row["of"] == "front" && row["what"] == "latency").unwrap()["why"]
         .as_str()
@@ -218,8 +218,8 @@ fn wrong_speed_of_sound_is_reported_without_a_settings_line() {
     }
 }
 
-/// If the log has no stationary phase, no mount and no zero of the cable counter is found. In a very short log, nothing
-/// is found.
+/// If the log has no stationary phase, `calibrate` finds no mount and no zero of the cable counter. In a very short
+/// log, it finds nothing.
 #[test]
 fn calibrate_without_a_stationary_phase_says_so() {
     let folder = folder(false, &filed(), "");

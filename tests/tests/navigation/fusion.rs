@@ -8,7 +8,7 @@ use headrace_tests::field::{Figures, POSE, TURN_S, field, figures, nees, rms, sh
 use headrace_tests::scenes;
 use headrace_tests::tracking::{self, Silence, Track, dive, filter};
 
-/// Number of simulated dives, each with its own seed. The bounds below are valid for this number.
+/// Number of simulated dives, each with its own seed. The bounds in the tests are valid for this number of dives.
 const SEEDS: u64 = 20;
 /// Distance that the vehicle covers in one turn of its head, m.
 const T_X_M: f64 = TURN_S * 0.197;
@@ -58,7 +58,8 @@ fn file_bytes(name: &str) -> Result<Vec<u8>, String> {
 
 /// Smallest allowed share of sections whose hole error is within two standard deviations if heads are far apart along
 /// the hull. The goal is 0.9. It isn't reached because the walls correct the attitude of a noisy inertial unit only
-/// partly. Neighbouring passes then have less yaw error in common than the filter assumes.
+/// partly. The heads pass neighbouring lines at different times, and their yaw errors then have less in common than the
+/// filter assumes.
 const LEAST_APART: f64 = 0.8;
 
 /// If heads are mounted far apart along the hull, they pass neighbouring lines on the wall at quite different times.
@@ -100,7 +101,7 @@ fn filter_is_accurate_and_consistent_in_field_dives() {
 }
 
 /// Checks the filter's errors. Lateral and vertical errors are at most 5 cm, and the lateral error is at most a third
-/// of that without the filter.
+/// of the error without the filter.
 ///
 /// Averaged over the dives, the error of the displacement during a turn must be below 3 cm, or below 2 % of the
 /// distance [`T_X_M`] per turn if that is larger.
@@ -138,7 +139,8 @@ fn consistent_estimates(all: &[Dives]) {
     let means: Vec<f64> = (SETTLED..epochs)
         .map(|epoch| all.iter().map(|dives| nees(&dives.filter.epochs[epoch])).sum::<f64>() / runs)
         .collect();
-    // Bounds of chi-square by the Wilson-Hilferty approximation, which is accurate for so many degrees of freedom.
+    // The bounds of chi-square come from the Wilson-Hilferty approximation, which is accurate for this many degrees of
+    // freedom.
     let freedom = runs * POSE.len() as f64;
     let bound = |z: f64| {
         let cube = 1.0 - 2.0 / (9.0 * freedom) + z * math::sqrt(2.0 / (9.0 * freedom));
@@ -158,7 +160,7 @@ fn consistent_estimates(all: &[Dives]) {
 
 /// Checks the NIS (normalised innovation squared) of each kind of sensor.
 ///
-/// The mean must be within 0.2 of one, because the filter learns the noise. Only that of the cable counter may be
+/// The mean must be within 0.2 of one, because the filter learns the noise. Only the mean of the cable counter may be
 /// lower. The average over ten seconds and all dives must be within the 95 % bounds at least a third of the time. A
 /// sensor with less noise than assumed may be below the bounds. This applies to sensors whose rounding is treated as
 /// noise, and to a compass without steel nearby.
@@ -210,7 +212,8 @@ fn add_to_bins(bins: &mut [(f64, u64)], track: &Track, source: usize) {
 }
 
 /// Checks that the hole diameter D is within two standard deviations of its true value in enough sections: their share
-/// is from `least` to 0.99. The true value is D with the same returns at their true places.
+/// is from `least` to 0.99. The true value is the hole diameter that results from the same returns at their true
+/// places.
 fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
     let within = share(holes.iter().map(|(error, sigma)| error.abs() <= 2.0 * sigma));
     let [error_m, arc_m] = [rms(holes.iter().map(|h| h.0)), rms(holes.iter().map(|h| h.1))];
@@ -223,9 +226,9 @@ fn holes_within_their_bounds(holes: &[(f64, f64)], least: f64) {
 
 /// Simulates a dive with silent sensors.
 ///
-/// Returns three results. The first tells for each error of each epoch whether it is within three standard deviations.
-/// The second is the largest ratio of an error to its standard deviation. The third is the fraction of pings without a
-/// fix.
+/// Returns three results. The first result tells for each error of each epoch whether it is within three standard
+/// deviations. The second result is the largest ratio of an error to its standard deviation. The third result is the
+/// fraction of pings without a fix.
 fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     let scene = field(seed, 40.0);
     let track = dive(&scene, filter(&scene), silence);
@@ -236,8 +239,8 @@ fn silenced(seed: u64, silence: Silence) -> (Vec<bool>, f64, f64) {
     (off.iter().map(|off| *off <= 3.0).collect(), off.iter().copied().fold(0.0, f64::max), lost)
 }
 
-/// In some dives a sensor is silent for a while, and in another one until the end. The errors must stay within their
-/// reported bounds.
+/// In some dives a sensor is silent for a while, and in others until the end. The position errors must stay within
+/// their reported bounds.
 #[test]
 fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
     for (name, sources) in [
@@ -251,8 +254,9 @@ fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
         ("everything", vec![0, 1, 2, 3, 4, 5, 6, 7]),
     ] {
         for to_s in [70.0, 120.0, f64::INFINITY] {
-            // While the inertial unit is silent, the filter must guess the motion. In some dives this biases the range
-            // noise that it learns, which becomes visible when the unit returns. Several seeds are therefore tried.
+            // While the inertial unit is silent, the filter must guess the motion. In some dives the guess biases the
+            // range noise that the filter learns. The bias becomes visible when the unit sends data again. Several
+            // seeds are therefore tried.
             let seeds = if name == "the inertial unit" && to_s.is_finite() { 1..=6 } else { 3..=3 };
             let dives: Vec<_> = seeds
                 .map(|seed| silenced(seed, Silence { sources: sources.clone(), from_s: 60.0, to_s }))
@@ -263,8 +267,8 @@ fn position_error_stays_within_its_bounds_while_sensors_are_silent() {
             println!(
                 "{name} from 60 to {to_s} s: within 3 sigma {within:.4}, worst {worst:.1}, no fix {lost:.2}"
             );
-            // About 0.3 % of normally distributed errors exceed three standard deviations. In a sample of this size,
-            // none is much larger than that.
+            // About 0.3 % of normally distributed errors exceed three standard deviations. In a sample of this size, no
+            // error exceeds five standard deviations.
             assert!(within > 0.997 && worst < 5.0, "{name} to {to_s}: {within}, {worst}");
             let is_needed = sources.contains(&7) && !sources.contains(&6) && to_s > 100.0;
             assert_eq!(

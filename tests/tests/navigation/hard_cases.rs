@@ -11,7 +11,7 @@ use headrace_tests::tracking::{Silence, Track, dive, filter};
 const SCENE: &str = "vehicle = \"vita2-2.toml\"\n[effects]\nmotion_within_turn = {}\n[trajectory]\nkind = \"recorded\"\n\
     file = \"way.csv\"\n";
 
-/// Trajectory that leaves the horizontal and returns to it, at 0.05 m/s.
+/// Trajectory at 0.05 m/s that begins and ends with a horizontal vehicle.
 ///
 /// The vehicle pitches nose down to 135 degrees, then nose up and over, and yaws beyond 180 degrees to the left and
 /// right.
@@ -35,7 +35,7 @@ fn way() -> String {
     text
 }
 
-/// Largest errors of the fixes, and numbers of fixes in unusual attitudes.
+/// Largest errors of the position fixes, and numbers of fixes in unusual attitudes.
 #[derive(Debug, Default)]
 struct Errors {
     turn_rad: f64,

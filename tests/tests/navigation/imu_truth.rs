@@ -1,9 +1,9 @@
 //! Validation: attitude from gyros and accelerometers alone, compared with optical motion capture.
 //!
 //! The filters of Madgwick and Mahony (crate `ahrs`) run on the same samples. The recording is trial 12 of BROAD: slow
-//! hand motion within about a metre (`recordings/imu_broad`). The copy in this repository has the first 105 s. If
-//! `HEADRACE_RECORDINGS` is set, all 196 s are also used. With `--nocapture` the test prints the inclination error
-//! while the unit moves and the heading drift over the recording, in degrees.
+//! hand motion within about a metre (`recordings/imu_broad`). The copy of the recording in this repository has the
+//! first 105 s. If `HEADRACE_RECORDINGS` is set, the test also uses all 196 s. With `--nocapture` the test prints the
+//! inclination error while the unit moves and the heading drift over the recording, in degrees.
 
 use std::fs::File;
 use std::io::Read as _;
@@ -28,14 +28,16 @@ const COLUMNS: [&str; 11] = ["gx", "gy", "gz", "ax", "ay", "az", "qw", "qx", "qy
 const DEGREE: f64 = core::f64::consts::PI / 180.0;
 const GRAVITY_MPS2: f64 = 9.81;
 const SAMPLE_S: f64 = 0.0105;
-/// Number of samples between updates of the error state. As in the filter, the time between updates is about 0.1 s.
+/// Number of samples between updates of the error state. The time between updates is about 0.1 s, as in headrace's
+/// filter.
 const EPOCH: usize = 10;
 /// Number of inertial samples per second in the recording.
 const SECOND: usize = 95;
-/// Usual speed of a hand, m/s. The filter expects velocities of this size, because no sensor measures the velocity.
+/// Usual speed of a hand, m/s. The filter is told to expect velocities of this size, because no sensor measures the
+/// velocity.
 const HAND_MPS: f64 = 0.5;
-/// The inertial unit counts as stationary if its turn rate varies by no more than this within a second, and its force
-/// by no more than `STILL_MPS2`. Both values are a few times the noise.
+/// The inertial unit counts as stationary if its turn rate varies by no more than this within a second, and its
+/// specific force by no more than `STILL_MPS2`. Both limits are a few times the noise.
 const STILL_RADPS: f64 = DEGREE;
 const STILL_MPS2: f64 = 0.8;
 const STILL_SD_MPS: f64 = 0.01;
@@ -95,7 +97,7 @@ fn first_attitude(samples: &[Sample]) -> Rot<Tunnel, Body> {
 struct Off {
     inclination_rms: f64,
     inclination_max: f64,
-    /// Heading error at the end, relative to the heading error at the start.
+    /// Heading error at the end minus the heading error at the start.
     drift: f64,
 }
 
@@ -179,8 +181,8 @@ impl Alone {
         leg.disturb(&self.settings, &transition, &mut self.factors);
     }
 
-    /// Constrains the velocity once a second. It is constrained to zero if the unit is stationary, and else to the
-    /// speed of a hand. A stationary unit also shows its gyro biases.
+    /// Constrains the velocity to zero once a second. The standard deviation is small if the unit is stationary, and
+    /// otherwise the speed of a hand. A stationary unit also shows its gyro biases.
     fn end_second(&mut self) {
         let rates = self.second.iter().map(|sample| sample.rate_radps);
         let forces = self.second.iter().map(|sample| sample.force_mps2);
@@ -215,7 +217,7 @@ fn ours(samples: &[Sample]) -> Off {
 type PeerVector = peers::Vector3<f64>;
 type PeerRotation = peers::UnitQuaternion<f64>;
 
-/// Computes the errors of a filter from the `ahrs` crate. Converts its vector types.
+/// Computes the errors of a filter from the `ahrs` crate. Converts the samples to the vector types of this crate.
 fn judge_peer(samples: &[Sample], mut step: impl FnMut(PeerVector, PeerVector) -> PeerRotation) -> Off {
     let vector = |v: Vec3<Body>| PeerVector::new(v.x(), v.y(), v.z());
     judge(samples, |sample| {
@@ -299,7 +301,8 @@ fn no_worse_than_published_filters(samples: &[Sample]) {
         assert!(ours.inclination_rms <= off.inclination_rms, "{name}: {off:?}; ours {ours:?}");
         assert!(ours.drift.abs() <= off.drift.abs(), "{name}: {off:?}; ours {ours:?}");
     }
-    // Even without gyro bias, the published filters are as accurate only if their gains are tuned to this recording.
+    // Even without gyro bias, the published filters are as accurate as headrace's filter only if their gains are tuned
+    // to this recording.
     let unbiased = unbiased(samples);
     for (name, off) in usual_peers(&unbiased) {
         say(&format!("{name}, bias removed"), &off);

@@ -1,7 +1,7 @@
 //! A vehicle with a velocity log and an autopilot. The autopilot has the inertial unit, the pressure sensor and the
 //! distance sensors.
 //!
-//! The crates of these devices are used unchanged. The tests cover all steps from the simulator's bytes to the
+//! The tests use the crates of these devices unchanged, and cover all steps from the simulator's bytes to the
 //! navigation.
 
 use headrace_tests::Folder;
@@ -49,8 +49,8 @@ fn autopilot_sensors_and_a_velocity_log_are_fused() {
     let dvl = &source(&report, "dvl")["navigation"];
     println!("velocity log: {dvl}");
     assert_eq!(dvl["gated"], 0, "{dvl}");
-    // The first reading arrives 100 ms after its ping. Its ping may therefore be before the filter's start, which makes
-    // the reading late. There are two readings a second, with three components each.
+    // The first reading arrives 100 ms after its ping. The ping may therefore be earlier than the filter's start, and
+    // the reading then counts as late. There are two readings a second, with three components each.
     assert!(dvl["late"].as_u64().unwrap() <= 1 && dvl["used"].as_u64().unwrap() > 220, "{dvl}");
     assert!(dvl["nis"].as_f64().unwrap() < 0.001, "{dvl}");
     let dive = &report["dive"];

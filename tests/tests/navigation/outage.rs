@@ -1,7 +1,7 @@
 //! Sensors that fall silent during a dive.
 //!
-//! Pings without a position are reported. No flag is raised for a hole that driving on fills. When the sensors return,
-//! the dive goes on.
+//! Pings without a position are reported. No flag is raised for a hole that is filled when the vehicle drives on. When
+//! the sensors send data again, the dive goes on.
 
 use headrace_tests::{Folder, raw_messages, write_log};
 use mcap::WriteOptions;
@@ -10,11 +10,11 @@ use serde_json::Value;
 const LEG: &str = "vehicle = \"vehicle.toml\"\n[trajectory]\nstart_m = 2\n[[trajectory.legs]]\ndistance_m = 12\nspeed_mps = 0.197\n";
 
 /// Replays a dive of 12 m with four heads, without the data that `source` sends between two times. The times are
-/// seconds on the clock of the source. An empty name means all sources.
+/// seconds on the clock of the source. An empty `source` stands for all sources.
 fn without(way: &str, source: &str, from_s: f64, to_s: f64) -> Value {
     let folder = Folder::new();
-    // The simulated heads have no bodies that could hide the wall. The speed by the formula of Jorge et al. therefore
-    // meets the target.
+    // The simulated heads have no bodies that could hide the wall. At the speed by the formula of Jorge et al., the
+    // holes therefore meet the target.
     let vehicle = include_str!("../../../deploy/vehicles/vita2-4.toml")
         .replace("planned_speed_mps = 0.10", "planned_speed_mps = 0.197")
         .replace("[navigation]", &format!("[navigation]\nway = \"{way}\""));
@@ -61,15 +61,16 @@ fn short_tether_silence_is_bridged() {
     }
 }
 
-/// The dive is interrupted for half a minute, in which the vehicle drives on. Wall that no head sampled does not pass.
-/// The stretch before the interruption is judged as usual.
+/// The dive is interrupted for half a minute, in which the vehicle drives on. The wall that no head has sampled must
+/// not pass. The stretch before the interruption is judged as usual.
 #[test]
 fn wall_unseen_during_an_interruption_does_not_pass() {
     for way in ["direct", "filter"] {
         let report = without(way, "", 20.0, 50.0);
         let sections = report["sections"].as_array().unwrap();
         let start_m = |section: &Value| section["start_m"].as_f64().unwrap();
-        // At 0.197 m/s the vehicle drives from 5.9 to 11.9 m. The heads see 0.5 m ahead and behind.
+        // During the interruption, the vehicle drives at 0.197 m/s from 5.9 to 11.9 m. The heads see 0.5 m ahead and
+        // behind.
         let unseen = sections.iter().filter(|section| (6.6..11.0).contains(&start_m(section)));
         let passed: Vec<_> = unseen.filter(|section| section["verdict"] == "pass").map(start_m).collect();
         assert_eq!(passed, Vec::<f64>::new(), "{way}");

@@ -1,7 +1,7 @@
 //! Walls that deviate from the design.
 //!
-//! A stationary vehicle sees the same bumps in every turn of its heads. This must not make its heading more certain. A
-//! fallen vault must not bias the estimate.
+//! A stationary vehicle sees the same bumps in every turn of its heads. The repeated bumps must not make the heading
+//! estimate more certain. A fallen vault must not bias the position estimate.
 
 use headrace_fusion::filter::state::{ATTITUDE, POSITION};
 use headrace_geometry::math;

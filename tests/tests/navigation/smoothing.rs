@@ -71,9 +71,9 @@ struct Dives {
 
 /// Dives with a configured slack time of 8 s. The model then assumes that a quarter of the slack remains after a turn.
 ///
-/// A smoother depends more on its model than a filter does. The filter also works with a slack time of 15 s, although
-/// its model then assumes that more than half of the slack remains. With the smoother, however, the hole diameter D is
-/// then within two standard deviations in only 88.9 % of the sections.
+/// A smoother depends more on its model than a filter does. The filter also works with a configured slack time of 15 s,
+/// although the model then assumes that more than half of the slack remains. With the smoother, however, the hole
+/// diameter D is then within two standard deviations in only 88.9 % of the sections.
 fn dives(seed: u64) -> Dives {
     let scene = field_with(seed, 65.0, &SETTINGS.replace("slack_time_s = 15", "slack_time_s = 8"), "");
     let smoothed = smoothed(&scene, &Silence::default());
@@ -89,7 +89,8 @@ fn dives(seed: u64) -> Dives {
     Dives { smoothed, holes }
 }
 
-/// Smoothed errors must be consistent and no larger than the filter's.
+/// The smoother's errors must be consistent with their reported standard deviations, and no larger than the filter's
+/// errors.
 ///
 /// The NEES of a pose must be near 6, and the hole diameter D must be within two standard deviations of the truth in 90
 /// to 99 % of the sections.
@@ -144,8 +145,8 @@ fn smoothing_reduces_errors_and_stays_consistent() {
     }
 }
 
-/// The shipped vehicle file assumes large errors. With its settings, smoothing loses no fix that the filter has, and
-/// increases no error.
+/// The shipped vehicle file assumes large errors. With these settings, smoothing must lose no fix that the filter has,
+/// and must increase no error.
 #[test]
 fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     for seed in 1..=2 {
@@ -158,7 +159,8 @@ fn smoothing_increases_no_error_of_the_shipped_vehicle() {
     }
 }
 
-/// Root mean square of one component of the error between two times, and its largest ratio to its standard deviation.
+/// Root mean square of one component of the error between two times, and the largest ratio of this error to its
+/// standard deviation.
 fn between(epochs: &[Epoch], error: usize, from_s: f64, to_s: f64) -> (f64, f64) {
     let inside = epochs.iter().filter(|epoch| {
         let at_s = epoch.at.since(START).as_secs_f64();
@@ -175,7 +177,7 @@ fn smoothing_bridges_a_silence_with_readings_from_before_and_after() {
     let scene = field(3, 33.0);
     let from_s = 80.0;
     // The sonars are silent only briefly. Without ranges to the walls, the filter drops its estimate after half a
-    // minute, and then the readings after the silence are of no help.
+    // minute, and the smoother then can't use the readings after the silence.
     for (name, sources, errors, to_s) in [
         ("the tether", vec![7], vec![0], from_s + 60.0),
         ("all sonars", vec![0, 1, 2, 3, 4], vec![1, 2], from_s + 10.0),
@@ -228,8 +230,8 @@ fn smoothed_track_is_split_at_a_lost_estimate() {
     assert!(track.epochs.iter().all(|epoch| epoch.factors.is_sound()));
 }
 
-/// Effects for a dive three times as long as the usual short dive: sensor noise, steel that disturbs the compass, a
-/// drifting pilot, and far more cable slack than the filter assumes.
+/// Simulator effects for a dive three times as long as the usual short dive: sensor noise, steel that disturbs the
+/// compass, a drifting pilot, and far more cable slack than the filter assumes.
 const NOISE: &str = "
 [effects]
 imu_noise = { gyro_degps_rthz = 0.01, accel_mps2_rthz = 0.002, attitude_deg = 0.5 }

@@ -1,4 +1,4 @@
-//! Data sent to viewers. A new viewer gets all results of the loop, and a viewer that reconnects gets the changes.
+//! Data sent to viewers. A new viewer gets all results of the loop. A viewer that reconnects gets only the changes.
 
 use headrace_tests::Folder;
 use headrace_tests::page_client::{Serving, Viewer};
@@ -91,8 +91,8 @@ fn viewer_state_at_the_end_equals_the_report() {
     }
 }
 
-/// Data that a viewer has while the replay is paused: length of each verdict, missed stretches, verdicts of the
-/// sections, and stretches to go back to.
+/// Data that a viewer has received while the replay is paused: length of each verdict, missed stretches, verdicts of
+/// the sections, and stretches to go back to.
 fn seen(viewer: &Viewer) -> Value {
     let state = &viewer.state;
     let verdicts: Vec<_> = viewer.sections.iter().map(|(index, section)| (index, section.verdict)).collect();
@@ -126,7 +126,7 @@ fn replay_begun_in_the_middle_shows_the_same_as_one_from_the_beginning() {
             [&["replay", "dive.mcap", ANY, "--speed", "0.01x", "--from", &from][..], &targets].concat();
         let middle = Serving::start(&folder, &arguments);
         let mut viewer = Viewer::connect(&middle, "", &[]).unwrap();
-        // The test sends no command to this replay, because after a pause or a jump the server sends all data again.
+        // The test sends no command to this replay, because the server sends all data again after a pause or a jump.
         viewer.until("the jump", |viewer| viewer.state["now_s"].as_f64() > Some(from_s + at_s - 0.1));
         let late = joining(&middle);
         let now_s = late.state["now_s"].clone();
@@ -148,7 +148,8 @@ fn dive_is_compared_with_a_second_target() {
     let folder = Folder::with_dive();
     let (serving, mut viewer) = replayed_with(&folder, &["--target", "0.5,0.2"]);
     assert_eq!(viewer.hello["compared_m"], 0.2);
-    // For the second target too, sections behind a moving vehicle must be judged at once, not only at the end.
+    // Sections behind a moving vehicle must be judged at once for the second target too, and not only at the end of the
+    // dive.
     let judged =
         |viewer: &Viewer| viewer.sections.values().filter(|section| section.compared == Some(2)).count();
     assert!(judged(&viewer) > 3, "{:?}", viewer.sections);
@@ -169,8 +170,8 @@ fn dive_is_compared_with_a_second_target() {
         assert!((shown_m - summed_m).abs() < 1e-6, "{key}: {shown_m}, {summed_m}");
         apart_m += (shown_m - reported_m).abs() / 2.0;
     }
-    // For the second target, the page compares the holes of this dive with the other target, but the report replays the
-    // dive. The results differ at the ends of the covered stretch.
+    // For the second target, the page compares the holes of this dive with that target, but the report comes from
+    // another replay of the dive. The results differ at the ends of the covered stretch.
     let way_m = report["coverage_extent"]["length_m"].as_f64().unwrap();
     assert!(
         apart_m <= 0.2 * way_m,
@@ -187,8 +188,8 @@ fn dive_is_compared_with_a_second_target() {
 fn resumed_viewer_shows_the_same_as_a_new_viewer() {
     let folder = Folder::with_dive();
     let (serving, mut lost) = replayed(&folder);
-    // A seek back restarts the dive, which then has fewer sections. The viewer's connection is lost after that, while
-    // the dive goes on.
+    // A seek back restarts the dive, whose number of sections is then smaller. After that, the viewer loses its
+    // connection while the dive goes on.
     let [from_s, to_s] = span_s(&lost);
     // The seek leads to a late time in the dive, at which a part of the tunnel already has final verdicts.
     let middle_s = to_s - 0.1 * (to_s - from_s);
@@ -241,7 +242,7 @@ fn sent_samples_are_those_before_the_time_of_a_seek() {
     assert!(whole > 1000, "{whole}");
     let [from_s, to_s] = span_s(&viewer);
     let middle_s = f64::midpoint(from_s, to_s);
-    // The pause is needed because playback otherwise goes on after the seek, faster than states are sent.
+    // Without the pause, playback goes on after the seek, and faster than the server sends states.
     viewer.send(&json!({"do": "play", "command": "pause"}));
     viewer.send(&json!({"do": "play", "command": "seek", "to_s": middle_s}));
     viewer.until("the jump back", |viewer| viewer.state["now_s"].as_f64() < Some(middle_s + 0.1));
@@ -306,8 +307,8 @@ fn other_programs_can_read_widgets_state_schema_and_metrics() {
     let icon = extras["widgets"][0]["iconUrl"].as_str().unwrap();
     let (status, picture) = serving.ask("GET", &icon[icon.find("/assets").unwrap()..], &[], "");
     assert!(status == 200 && picture.contains("<svg"), "{icon}: {status}");
-    // The dive goes on while the test asks, so the states may differ at first. At the end of the log, both the page's
-    // server and the viewer have the last state.
+    // The dive goes on while the test asks the server for its state, so this state may differ from the viewer's at
+    // first. At the end of the log, both are the last state.
     loop {
         let (status, answer) = serving.ask("GET", "/state.json", &[], "");
         let body = answer.split("\r\n\r\n").nth(1).unwrap();

@@ -1,5 +1,5 @@
-//! A crawler that visits random moments of dives on all screens. Figures that appear twice must be equal, and each screen
-//! must give one instruction at a time.
+//! A crawler that visits random moments of dives on all screens. A figure must be the same wherever it appears, and
+//! each screen must give only one instruction at a time.
 
 mod contradictions;
 mod visit;
@@ -17,7 +17,7 @@ fn crawl(folder: &Folder, draw: &mut Draw, count: u32) -> Vec<String> {
     let last_s = crawl.last_s();
     let mut found = Vec::new();
     for _ in 0..count {
-        // Whole milliseconds are the same in all notations.
+        // The time is rounded to whole milliseconds, because these are the same in all notations.
         let at_s = (draw.between(0.5, last_s - 0.5) * 1e3).round() / 1e3;
         let moment = crawl.visit(at_s, &mut contradictions);
         found.extend(contradictions(&moment).into_iter().map(|one| format!("{at_s} s: {one}")));
@@ -44,8 +44,8 @@ fn screens_agree_at_random_moments_of_golden_dives() {
     assert!(found.is_empty(), "{found:#?}");
 }
 
-/// Run with: `cargo test --release -p headrace_tests --test page crawler -- --ignored --nocapture`. Another first seed:
-/// `HEADRACE_SEED=100`.
+/// Run with `cargo test --release -p headrace_tests --test page crawler -- --ignored --nocapture`. `HEADRACE_SEED=100`
+/// sets another first seed.
 #[test]
 #[ignore = "long: 200 moments of 20 dives"]
 fn screens_agree_at_200_random_moments_of_20_random_dives() {
@@ -90,7 +90,7 @@ fn crawler_finds_every_changed_figure() {
             *of.pointer_mut(path).unwrap() = value.clone();
             assert!(!contradictions(&changed).is_empty(), "{path} of the page: {of_page}");
         }
-        // The same change on the page and in the JSON line contradicts the terminal, or the other figures.
+        // If the same figure is changed on the page and in the JSON line, it contradicts the terminal or other figures.
         let mut changed = moment.clone();
         for of in [&mut changed.page, &mut changed.line] {
             *of.pointer_mut(path).unwrap() = value.clone();

@@ -1,5 +1,4 @@
-//! Crowds of other clients are drawn from seeds. They neither delay an operator, nor change a live dive or its
-//! recording.
+//! Crowds of other clients, drawn from seeds, must neither delay an operator nor change a live dive or its recording.
 //!
 //! The page's server needs real sockets and time, so the simulated world of `tests/tests/world.rs` has no crowds.
 
@@ -23,7 +22,7 @@ const OPERATOR: &str = "?token=operator-0123456789abcdef";
 const VIEWER: &str = "?token=viewer-0123456789abcdef";
 /// Longest time in which the operator must be served.
 const WITHIN: Duration = Duration::from_secs(1);
-/// Interval of the crowd's actions, and of the operator's requests.
+/// Interval between the crowd's actions, and between the operator's requests.
 const PAUSE: Duration = Duration::from_millis(50);
 const MOST_MEMBERS: usize = 120;
 
@@ -34,9 +33,9 @@ enum Client {
     Silent,
     /// Sends half of a request's head.
     HalfSent,
-    /// Requests the lines of the feed and reads them slowly.
+    /// Requests the feed as lines and reads them slowly.
     SlowReader,
-    /// Requests the lines of the feed and reads nothing.
+    /// Requests the feed as lines and reads nothing.
     UnreadLines,
     /// Opens a WebSocket and reads nothing.
     UnreadSocket,
@@ -76,7 +75,8 @@ impl Group {
         }
     }
 
-    /// Keeps the group's connections open until the dive has ended. In each turn, the oldest connection is replaced.
+    /// Keeps the group's connections open until the dive has ended. A new connection replaces the oldest one at each
+    /// interval [`PAUSE`].
     fn stay(self, address: &str, query: &str, has_ended: &AtomicBool) {
         let mut open = std::collections::VecDeque::new();
         while !has_ended.load(Ordering::SeqCst) {

@@ -1,5 +1,5 @@
-//! Tests the operator's page over real sockets: its data and its access rights. Also checks that it doesn't influence
-//! the dive.
+//! Tests the operator's page over real sockets: its data and its access rights. Also checks that the page doesn't
+//! influence the dive.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]

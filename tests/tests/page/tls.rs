@@ -2,7 +2,7 @@
 //! reported.
 //!
 //! `certificates/` has a certificate for `localhost` and 127.0.0.1 until 2126, its key, and another key that doesn't
-//! match. All of them are only for tests. They were made with `openssl ecparam -name prime256v1 -genkey`, and with
+//! match. All these files are only for tests. They were made with `openssl ecparam -name prime256v1 -genkey`, and with
 //! `openssl req -x509` without a CA's rights.
 
 use std::io::{Read, Write};
@@ -129,7 +129,7 @@ fn client_without_tls_gets_nothing_and_blocks_nobody() {
             .write_all(format!("GET {path} HTTP/1.1\r\nHost: {address}\r\n{token}\r\n\r\n").as_bytes())
             .unwrap();
         let mut answer = Vec::new();
-        // Reading may fail, because the server resets the connection if it has data that it hasn't read.
+        // Reading may fail, because a connection is reset if the server closes it with unread data.
         let _reset = plain.read_to_end(&mut answer);
         assert!(answer.len() < 16 && !answer.starts_with(b"HTTP"), "{answer:?}");
     }

@@ -1,5 +1,5 @@
-//! Voice notes. The loop keeps the note, and the log keeps the note's sound recording. The note works without the
-//! recording, and the recording without the note.
+//! Voice notes. The loop keeps the note, and the log keeps the note's sound recording. A note works without its
+//! recording, and a recording without its note.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -17,15 +17,15 @@ const OPERATOR: &str = "Authorization: Bearer operator-0123456789abcdef";
 const WEBM: &str = "Content-Type: audio/webm;codecs=opus";
 const LOG: &str = "headrace-demo/dive.mcap";
 
-/// Returns a sound recording. Like a browser's recording, it has all the properties that the program checks. Its
-/// content is random, so it can't be compressed.
+/// Returns a sound recording. It has all the properties of a browser's recording that the program checks. Its content
+/// is random, so it can't be compressed.
 fn webm(seed: u64, bytes: usize) -> Vec<u8> {
     let mut random = Random(seed);
     let noise = (4..bytes).map(|_| random.byte());
     [0x1a, 0x45, 0xdf, 0xa3].into_iter().chain(noise).collect()
 }
 
-/// A demonstration that runs until the test stops it.
+/// Starts a demonstration dive that runs until the test stops it.
 fn demo(folder: &Folder, further: &[&str]) -> Serving {
     Serving::start(folder, &[&["demo", ANY, "--no-open", "--speed", "30x"], further].concat())
 }

@@ -9,7 +9,7 @@ const TABLE: &str = "plugins/dashboard/page/src/text/table.ts";
 /// Environment variable that makes this test rewrite the table.
 const RENEW: &str = "HEADRACE_RENEW_WORDS";
 
-/// Rewrite the table with `HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words`.
+/// To rewrite the table, run `HEADRACE_RENEW_WORDS=1 cargo test -p headrace_tests --test page words`.
 #[test]
 fn displayed_words_of_the_page_equal_those_of_the_program() {
     let path = root().join(TABLE);

@@ -17,7 +17,7 @@ use headrace_vehicle::VehicleConfig;
 use serde_json::Value;
 
 const LOCAL: IpAddr = IpAddr::V4(Ipv4Addr::LOCALHOST);
-/// Number of probe requests without an answer after which the test treats a device as silent.
+/// Number of unanswered probe requests after which the test treats a device as silent.
 const TRIES: u32 = 30;
 const HEAD: &str = "plugin = \"imagenex881\"\nmode = \"slow\"\nrange_m = 10\nhead_id = 0x12";
 const PING: &str = "plugin = \"ping1d\"\ndevice_id = 7";
@@ -131,7 +131,7 @@ fn devices_on_real_ports_are_identified() {
             ),
         ] {
             let device = Device::emulated(carrier, keys);
-            // The device is probed twice, because a probe must leave the line in a state in which another probe
+            // The device is probed twice, because after a probe the line must be in a state in which the next probe
             // succeeds.
             for _ in 0..2 {
                 let identity = identity(&device).unwrap_or_else(|| panic!("{carrier:?}: {words}: no answer"));

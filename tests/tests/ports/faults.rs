@@ -21,8 +21,7 @@ fn sensor(text: &'static str, end: End, fault: impl Fault + 'static) -> Sensor {
     Sensor { text, end, fault: Box::new(fault) }
 }
 
-/// On a busy machine, a sensor without faults may have statuses that begin with these texts. The tests ignore such
-/// statuses.
+/// Starts of statuses that a sensor without faults may have if the machine is busy. The tests ignore such statuses.
 const OF_A_BUSY_MACHINE: [&str; 3] = [
     "wrong: can't keep up with",
     "wrong: falls behind because replies are lost",
@@ -45,7 +44,7 @@ fn words(said: &[String]) -> String {
 }
 
 /// Unplugs a device when the next request arrives, waits until it is reported missing, plugs it in, and waits until it
-/// is used again. Does this twice and returns the statuses.
+/// is used again. Does all this twice, and returns the statuses.
 fn unplugged_and_plugged_in(text: &'static str, end: End, name: &str) -> String {
     let folder = Folder::new();
     let log = folder.path(&format!("{name}.mcap"));
@@ -143,7 +142,7 @@ fn device_plugged_in_during_the_dive_is_used() {
     "#);
 }
 
-/// Runs an echosounder and a head on lines that are garbled at first and without faults later. A third sensor must not
+/// Runs an echosounder and a head on lines that are garbled at first and have no faults later. A third sensor must not
 /// be disturbed.
 fn garbled(change: fn(&mut Random, &[u8]) -> Vec<u8>) {
     let folder = Folder::new();
@@ -197,7 +196,8 @@ fn with_bursts(seed: u64, lure: &'static [u8]) -> impl Fault {
 #[test]
 fn bursts_of_garbage_lose_no_frame() {
     let folder = Folder::new();
-    // The garbage announces long frames: an echosounder profile of 1200 strengths, and a head's return of 500 points.
+    // The garbage contains headers of long frames: an echosounder profile of 1200 strengths, and a head's return of 500
+    // points.
     let end = End::serial(&folder.path(""), "usb-ping-port0");
     let sensors = vec![
         sensor(PING, end, with_bursts(3, b"BR\xCA\x04\x14\x05\x01\x00")),
@@ -413,8 +413,8 @@ impl Fault for DeafAtFirst {
     }
 }
 
-/// The drivers of both devices share the line. While one driver waits for an answer that never arrives, the other
-/// driver sends nothing.
+/// The drivers of both devices share the line. While one driver waits for an answer that is lost, the other driver
+/// sends nothing.
 #[test]
 fn two_devices_on_one_line_start_although_first_answers_are_lost() {
     let end = End::tcp();

@@ -44,8 +44,8 @@ fn report(folder: &Folder) -> Value {
 
 /// Runs a dive on a local port with a device and a foreign sender.
 ///
-/// The first frames come from a foreign system. The right device sends only after the host has sent to it. Returns the
-/// report and the number of recorded pressures.
+/// The first frames come from a foreign system. The right device sends only after the host has sent something to it.
+/// Returns the report and the number of recorded pressures.
 fn dive_among_strangers(option: &str, keys: &str) -> (Value, usize, usize) {
     let folder = Folder::new();
     let place = UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();

@@ -84,8 +84,8 @@ fn every_packet_dropped_by_a_full_ring_is_counted() {
         driver: Box::new(Counting(count.clone())),
     };
     let supervisor = Supervisor::start(vec![connection], None).unwrap();
-    // The loop doesn't tick here, so nothing empties the ring. Some datagrams are lost in the kernel or before the port
-    // is open, so the test sends until 20 have arrived.
+    // The loop doesn't tick here, so nothing empties the ring. Some datagrams are lost, either in the kernel or because
+    // the port isn't open yet, so the test sends until 20 have arrived.
     let device = UdpSocket::bind("127.0.0.1:0").unwrap();
     while count.load(Ordering::Acquire) < 20 {
         device.send_to(&[7; 1000], place).unwrap();

@@ -1,4 +1,5 @@
-//! Linux's own behaviour on which the drivers rely: CAN interfaces that go down, and counters that are unplugged.
+//! Behaviour of the Linux kernel on which the drivers rely: CAN interfaces that go down, and counters that are
+//! unplugged.
 //!
 //! CAN interfaces and `/dev/uhid` need root and modules. These tests are therefore ignored by default, and run on the
 //! kernel of a virtual machine: `tests/vm/run -- PROGRAM kernel_can_hid:: --ignored --test-threads=1`, where PROGRAM is
@@ -26,7 +27,7 @@ const ENETDOWN: i32 = 100;
 const VENDOR_ID: u16 = 0x1209;
 const PRODUCT_ID: u16 = 0x0001;
 
-/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -59,7 +60,7 @@ fn frame(first: u8) -> CanFrame {
     CanFrame::new(StandardId::new(0x123).unwrap(), &[first, 2, 3]).unwrap()
 }
 
-/// Error number and kind that a read returns, which must not return a frame.
+/// Error number and error kind of a read. The read must not return a frame.
 fn refused(read: std::io::Result<CanFrame>) -> (Option<i32>, ErrorKind) {
     let error = read.unwrap_err();
     println!("CAN: {error:?}");
@@ -83,7 +84,8 @@ fn frame_carries_the_kernel_receive_time() {
     stamped.set_recv_timestamp(true).unwrap();
 
     // Sends a frame, and tells whether its timestamp is earlier than the time of reading it. The kernel begins to stamp
-    // frames only a moment after stamping is enabled. Until then, a frame's timestamp is the time of reading.
+    // frames only a moment after stamping is enabled. Until the kernel does so, a frame's timestamp is the time of
+    // reading.
     let stamped_early = |number| {
         let before = SystemTime::now();
         sender.write_frame(&frame(number)).unwrap();

@@ -1,8 +1,8 @@
 //! The CAN and HID drivers on a real kernel, with emulated devices.
 //!
-//! All sent data is decoded. If the CAN interface or the counter disappears, the other sensor goes on. When it returns,
-//! it is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run --with
-//! target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
+//! All sent data is decoded. If the CAN interface or the counter disappears, the other sensor goes on. A sensor that
+//! returns is used again. Like `kernel_can_hid.rs`, these tests need the kernel of a virtual machine: `tests/vm/run
+//! --with target/debug/headrace_under_test -- PROGRAM kernel_drivers:: --ignored --test-threads=1`.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -31,7 +31,7 @@ const TETHER: usize = 1;
 
 /// Longest time that a test waits for expected data.
 const LONG: DurNs = DurNs::from_millis(20_000);
-/// If a line is silent for this time, no more data is expected on it.
+/// Duration of silence after which a test expects no more data on a line.
 const SETTLED: DurNs = DurNs::from_millis(200);
 /// Number of messages sent at once. The kernel buffers more reports than this for a counter.
 const BURST: usize = 20;
@@ -63,7 +63,7 @@ counts_per_metre = 2000
 const WAY: &str =
     "vehicle = \"vehicle.toml\"\n[trajectory]\n[[trajectory.legs]]\ndistance_m = 20\nspeed_mps = 0.2\n";
 
-/// Runs `ip link` with the arguments in `words`, which are separated by spaces.
+/// Runs `ip link` with the arguments in `words`, separated by spaces.
 fn ip_link(words: &str) {
     let status = Command::new("ip").arg("link").args(words.split(' ')).status().unwrap();
     assert!(status.success(), "ip link {words}: {status}");
@@ -91,7 +91,7 @@ fn counter(serial: &str) -> EmulatedPort {
     EmulatedPort::hid(&identity, &REFERENCE_DESCRIPTOR).unwrap()
 }
 
-/// Path that the kernel gives to a counter.
+/// Path that the kernel gives to the counter with a serial number.
 fn path(serial: &str) -> String {
     for _ in 0..1000 {
         let api = HidApi::new().unwrap();
@@ -205,7 +205,8 @@ impl Rehearsal {
         }
     }
 
-    /// Sends messages to a sensor's driver until the loop gets one. Messages sent before the line is open are lost.
+    /// Sends messages to a sensor's driver until the loop gets one, because messages that are sent before the line is
+    /// open are lost.
     #[track_caller]
     fn call(&mut self, source: usize, stand: &mut EmulatedPort) {
         let before = self.settle(source);
@@ -224,7 +225,8 @@ impl Rehearsal {
         self.exactly_after(before, source, stand, count);
     }
 
-    /// As [`Self::exactly`], but sends at once. `before` messages have already been decoded.
+    /// As [`Self::exactly`], but sends without waiting for the line to be silent. `before` messages have already been
+    /// decoded.
     #[track_caller]
     fn exactly_after(&mut self, before: u64, source: usize, stand: &mut EmulatedPort, count: usize) {
         for burst in (0..count).step_by(BURST) {
@@ -334,7 +336,8 @@ fn late_read_does_not_change_a_frame_timestamp() {
         sent.since(begun).as_secs_f64() * 1e3
     );
     assert_eq!(all.len(), BURST);
-    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at once.
+    // The tolerance is needed because the timestamps come from another clock, and two clocks can't be read at the same
+    // moment.
     let slack = DurNs::from_millis(2);
     for (number, (stamp, read)) in all.iter().enumerate() {
         assert!(
@@ -417,7 +420,7 @@ fn replugged_can_adapter_is_used_again() {
     rehearsal.send(IMU, &mut imu, 3);
     rehearsal.exactly(TETHER, &mut tether, 60);
     let vcan = Interface::up("vcan6");
-    // The inertial unit's end of the line was opened before the interface was made again, and still works.
+    // The emulated inertial unit opened its end of the line before the interface was made again. This end still works.
     rehearsal.call(IMU, &mut imu);
     rehearsal.exactly(IMU, &mut imu, 100);
     rehearsal.wait_for(IMU, Phase::Running, "");

@@ -1,5 +1,5 @@
-//! Devices on real ports: emulated devices, faulty lines, the kernel's own CAN and HID, and the transport of bytes to
-//! the loop.
+//! Devices on real ports: emulated devices, faulty lines, the kernel's own CAN and HID, and the way of the bytes to the
+//! loop.
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 

@@ -10,7 +10,7 @@ use headrace_tests::Folder;
 use serde_json::Value;
 
 /// A scene with four heads, two of them on serial lines, and with echosounders on serial lines and on UDP. All other
-/// sensors are on UDP.
+/// sensors use UDP.
 pub(crate) fn scene(distance_m: f64) -> String {
     let vehicle = headrace_tests::root().join("deploy/vehicles/vita2-4.toml");
     format!(
@@ -65,7 +65,7 @@ impl Drop for Running {
     }
 }
 
-/// Starts an emulator. Returns its process, the lines that it prints after the start, and the path of the vehicle file
+/// Starts `emulate`. Returns its process, the lines that it prints after the start, and the path of the vehicle file
 /// that it has written.
 pub(crate) fn emulate(
     folder: &Folder,
@@ -135,15 +135,15 @@ fn sections(report: &Value) -> BTreeMap<String, &Value> {
     sections.map(|section| (format!("{:9.3}", section["start_m"].as_f64().unwrap()), section)).collect()
 }
 
-/// Allowed difference between the diameters of a section's hole in the live dive and in the replay of the simulated
-/// scene, m.
+/// Allowed difference between the hole diameter of a section in the live dive and in the replay of the simulated scene,
+/// m.
 const APART_M: f64 = 0.12;
 /// Target of the scene, m. `CONFIDENCE_SD` is the number of standard deviations by which a hole must be below the
 /// target to pass.
 const TARGET_M: f64 = 0.7;
 const CONFIDENCE_SD: f64 = 2.0;
 
-/// Whether a section passes with a margin below [`APART_M`].
+/// Whether a section passes with a margin of less than [`APART_M`].
 fn is_near(section: &Value) -> bool {
     let of = |key: &str| section[key].as_f64().unwrap_or(f64::NAN);
     section["verdict"] == "pass" && TARGET_M - of("hole_m") - CONFIDENCE_SD * of("hole_sd_m") < APART_M
@@ -166,8 +166,9 @@ fn differences(live: &BTreeMap<String, &Value>, replay: &BTreeMap<String, &Value
             continue;
         };
         let hole_m = |section: &Value| section["hole_m"].as_f64().unwrap_or(f64::NAN);
-        // In the two dives, the heads have slightly different phases, which changes a hole by some millimetres at most.
-        // If the machine stalls for a quarter of a second, however, the hole in the live dive truly becomes larger.
+        // The phases of the heads differ slightly between the two dives. This changes a hole by some millimetres at
+        // most. If the machine stalls for a quarter of a second, however, the hole in the live dive truly becomes
+        // larger.
         let apart_m = (hole_m(ours) - hole_m(theirs)).abs();
         if apart_m > APART_M {
             different.push(format!("{start} m: holes are {apart_m:.3} m apart"));

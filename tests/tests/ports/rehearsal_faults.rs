@@ -11,7 +11,7 @@ use rustix::process::Signal;
 
 use crate::rehearsal::{Running, headrace, scene};
 
-/// A running program with its output. It also has the program's input, if the program reads commands.
+/// A running program with its output, and with its input if the program reads commands.
 pub(crate) struct Piped {
     process: Running,
     commands: ChildStdin,
@@ -35,7 +35,7 @@ impl Piped {
         Self::start(folder, &["emulate", "--stand", "0", "--out", "rehearsal", "scene.toml"])
     }
 
-    /// Waits for a line that begins with `start` and contains `text`.
+    /// Waits for a line that begins with `start` and contains `text`, and returns this line.
     #[track_caller]
     pub(crate) fn until(&mut self, start: &str, text: &str) -> String {
         let line = self

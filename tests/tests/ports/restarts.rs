@@ -14,7 +14,8 @@ use crate::rehearsal::{emulate, headrace, interrupt, report, scene};
 
 /// Number of restarts, unless the environment sets another one.
 const RESTARTS: u64 = 6;
-/// Longest allowed time from the start of the program until the dive goes on. It allows for a busy machine.
+/// Longest allowed time from the start of the program until the dive goes on. It is long, because the machine may be
+/// busy.
 const RESUMED_WITHIN: Duration = Duration::from_secs(30);
 
 #[expect(clippy::disallowed_methods, reason = "how long a restart takes is wall time")]
@@ -29,8 +30,8 @@ fn random(n: u64) -> u64 {
     word ^ (word >> 27)
 }
 
-/// Starts the dive. Returns the process as soon as its output shows that the dive has begun or goes on. Also returns
-/// the time that this took.
+/// Starts the dive. As soon as the program's output shows that the dive has begun or goes on, returns the process and
+/// the time that the start took.
 fn start(folder: &Folder, vehicle: &str, (how, logs): (&str, &[&str])) -> (Child, Duration) {
     let begun = wall_clock();
     let mut run = headrace()
@@ -48,7 +49,7 @@ fn start(folder: &Folder, vehicle: &str, (how, logs): (&str, &[&str])) -> (Child
     (run, took)
 }
 
-/// Chainages of the starts of sections with a verdict.
+/// Start chainages of the sections with the verdict `verdict`.
 fn with_verdict(report: &Value, verdict: &str) -> BTreeSet<String> {
     let sections = report["sections"].as_array().unwrap().iter();
     let these = sections.filter(|section| section["verdict"] == verdict);
@@ -81,8 +82,8 @@ fn killed_and_resumed(restarts: u64, logs: &[&str]) -> Folder {
     assert_eq!(status.code(), Some(3), "data of the gaps is lost");
     let live = report(&folder.path("live.json"));
     let losses = live["log"]["losses"].as_array().unwrap();
-    // The report lists every interruption of the recording that it belongs to. Of each other recording, it lists only
-    // the last interruption.
+    // The report belongs to one recording, and lists every interruption of this recording. Of each other recording, it
+    // lists only the last interruption.
     assert_eq!(
         losses.len() as u64 + 1,
         restarts + logs.len() as u64,
@@ -131,8 +132,8 @@ fn dive_that_is_killed_many_times_is_one_dive_with_named_gaps() {
     assert_eq!(verified.code, Some(3), "{}{}", verified.stdout, verified.stderr);
 }
 
-/// A kill may leave one recording longer than the other. The dive goes on from the longer one. Results of the resumed
-/// dive may therefore differ from those of a replay of the shorter recording.
+/// A kill may leave one recording longer than the other, and the dive then goes on from the longer one. Results of the
+/// resumed dive may therefore differ from results of a replay of the shorter recording.
 #[ignore = "takes a minute at real speed; .ci/run runs it beside other tests"]
 #[test]
 fn dive_with_two_recordings_goes_on_in_both() {

@@ -1,7 +1,7 @@
 //! `headrace run` and `headrace check` with wrong, missing or silent ports.
 //!
-//! Each faulty sensor is reported together with the valid form of its address. The dive goes on with the other
-//! sensors, and the exit codes are right.
+//! Each faulty sensor must be reported together with the valid form of its address. The dive must go on with the other
+//! sensors. Exit codes are checked too.
 
 use headrace_tests::faulty::{End, Fault, Faulty, Healthy, Wire};
 use headrace_tests::pty::Terminal;
@@ -57,7 +57,7 @@ const RUN: [&str; 7] = ["run", "vehicle.toml", "--no-record", "--report", "repor
 /// Arguments of a run without a time limit.
 const RUN_UNTIL: [&str; 2] = ["vehicle.toml", "--no-record"];
 
-/// Whether the report's first sensor has more than ten readings and the status "running".
+/// Whether the first sensor in the report has more than ten readings and the status "running".
 fn first_runs(report: &Value) -> bool {
     let first = &report["sources"][0];
     let status = first["line"]["status"].as_str().unwrap_or_default();
@@ -119,7 +119,7 @@ fn wrong_or_missing_ports_are_reported_while_the_dive_goes_on() {
     address: closed: connect = "i2c:/dev/i2c-1:0x99": address "0x99" must be 0x08 to 0x77; allowed is i2c:/dev/i2c-1:0x40
     empty: closed: connect = "": it is empty; allowed are serial:/dev/serial/by-id/NAME?baud=115200, serial:usb:VID:PID[:SERIAL]?baud=115200, tcp:HOST:PORT, udp:HOST:PORT, udp-listen:ADDRESS:PORT, can:INTERFACE, hid:VID:PID[:SERIAL], i2c:/dev/i2c-1:0x40
     "#);
-    // The message differs if the kernel has no CAN.
+    // A kernel without CAN gives another message, which is replaced here by the message of a kernel with CAN.
     let absent = statuses(&absent).replace(
         "this kernel has no CAN; sudo modprobe can-raw",
         "there is no such interface; plug the adapter in; ip link lists the interfaces",
@@ -189,8 +189,8 @@ fn dive_ends_even_if_its_output_pipe_blocks_at_any_byte() {
     folder.write("vehicle.toml", vehicle(&ABSENT));
     let whole = folder.headrace(&RUN).stdout.len();
     assert!((200..PIPE).contains(&whole), "{whole} bytes");
-    // In the first case, the pipe is full from the start. In the other cases, it becomes full in the middle of the
-    // output. In the last case, this happens in the summary.
+    // The numbers are the free bytes in the pipe. With no free bytes, the pipe is full from the start. In the other
+    // cases, it becomes full in the middle of the output, and in the last case during the summary.
     let lines = [0, whole - 150, whole - 100, whole - 50, whole - 10].map(|room| ("", room));
     let json = ["--json", "--json-lines"].map(|how| (how, 0));
     let runs = lines.into_iter().chain(json).map(|(how, room)| {
@@ -231,7 +231,7 @@ fn unavailable_required_sensor_ends_the_dive() {
     "#);
 }
 
-/// A device with too short HID reports. A counter of another maker may send such reports.
+/// A device that sends too short HID reports, as a counter of another maker may do.
 struct Short;
 
 impl Fault for Short {

@@ -15,7 +15,7 @@ const DEPTH: &str = "bar100=udp:127.0.0.1:9";
 /// Answers to all questions about a vehicle without sonars.
 const ANSWERS: [&str; 6] = ["--tunnel", "circle,radius_m=2", "--length", "100", "--target", "0.5"];
 
-/// Arguments of `setup` for the devices of a vehicle file. Devices that can't be probed are named.
+/// Arguments of `setup` for the devices of a vehicle file. The arguments name the devices that can't be probed.
 fn arguments(vehicle: &VehicleConfig) -> Vec<String> {
     let mut arguments: Vec<String> =
         ["setup", "--tunnel", "ceran", "--length", "100", "--target", "0.7"].map(str::to_owned).into();
@@ -106,7 +106,7 @@ fn wrong_answers_are_errors_with_value_and_allowed_range() {
         ["--mount", "depth=0,0,50,ahead"],
         ["--mount", "sonar_7=0,0,0,ahead"],
     ] {
-        // clap accepts only one value of these options, so the wrong one replaces the good one.
+        // clap accepts each of these options only once, so the wrong value replaces the good one.
         let good = ANSWERS.chunks(2).filter(|answer| answer[0] != wrong[0]).flatten();
         let arguments: Vec<&str> =
             ["setup", "--port", DEPTH].iter().chain(good).chain(&wrong).copied().collect();

@@ -1,4 +1,5 @@
-//! Measures memory, files, threads, CPU time and drops in a long rehearsal, in which devices freeze now and then.
+//! Measures memory, open files, threads, CPU time and dropped data in a long rehearsal in which devices freeze now and
+//! then.
 //!
 //! `HEADRACE_SOAK_MINUTES=60 cargo test -p headrace_tests --test ports soak -- --ignored --nocapture`
 
@@ -10,14 +11,14 @@ use headrace_tests::Folder;
 
 use super::rehearsal::{Running, headrace, interrupt, report, scene};
 
-/// Default duration of a soak test, minutes.
+/// Default duration of a soak test (a long run that watches resources), minutes.
 const MINUTES: f64 = 10.0;
 /// Interval between two samples of the process's resources.
 const LOOK: Duration = Duration::from_secs(5);
 const LOOKS_A_FAULT: usize = 7;
 /// Duration of each freeze of a device.
 const FREEZE: Duration = Duration::from_millis(1_500);
-/// Number of resource samples at the start of the test that don't count in the checks of open files and threads.
+/// Number of resource samples at the start of the test that the checks of open files and threads ignore.
 const WARM_UP: usize = 12;
 
 /// Resources that a process uses at a moment.
@@ -38,7 +39,7 @@ fn look(pid: u32) -> Option<Look> {
     };
     let stat = std::fs::read_to_string(format!("{proc}/stat")).ok()?;
     let words: Vec<&str> = stat.rsplit_once(')')?.1.split_whitespace().collect();
-    // In `/proc/PID/stat`, user time and system time are the 12th and 13th word after the process name.
+    // In `/proc/PID/stat`, user time and system time are the 12th and 13th words after the process name.
     let cpu_ticks = words.get(11)?.parse::<f64>().ok()? + words.get(12)?.parse::<f64>().ok()?;
     let files = std::fs::read_dir(format!("{proc}/fd")).ok()?.count();
     Some(Look { resident_kib: field("VmRSS:")?, files, threads: field("Threads:")?, cpu_ticks })
@@ -105,8 +106,8 @@ fn soak_neither_leaks_nor_drops() {
     let tenths: Vec<String> =
         (0..=10).map(|tenth| format!("{:.1}", resident[tenth * (resident.len() - 1) / 10])).collect();
     // Memory growth is checked only in the second half of the soak test. In the first half, memory of rings, lists and
-    // sections becomes resident. It is allocated at the start of the dive, but becomes resident only when it is first
-    // used.
+    // sections becomes resident. This memory is allocated at the start of the dive, but becomes resident only when it
+    // is first used.
     let later = &resident[resident.len() / 2..];
     let (first, last) = (warm[0], warm[warm.len() - 1]);
     // Linux counts CPU time in ticks of 10 ms.

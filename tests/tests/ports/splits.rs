@@ -1,5 +1,5 @@
-//! All steps from a device's bytes to readings, without ports. If no byte is lost, readings and their times don't
-//! depend on how the bytes are split and delayed.
+//! All steps from a device's bytes to readings, without ports. As long as no byte is lost, readings and their times
+//! don't depend on how the bytes are split and delayed.
 //!
 //! A reading gets the time at which the first byte of its frame arrived.
 
@@ -103,7 +103,7 @@ fn frames(device: &dyn Device, random: &mut Random) -> Vec<Vec<u8>> {
     }
 }
 
-/// Passes these parts of a stream through driver and decoder, and wakes the driver at its deadlines. Returns the
+/// Passes the parts of a stream through driver and decoder, and wakes the driver at the driver's deadlines. Returns the
 /// readings.
 fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let mut driver = device.driver(&DriverSetup { begun: START, head: None });
@@ -123,7 +123,7 @@ fn readings(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     readings
 }
 
-/// Passes these parts of a stream through the decoder alone, as for a foreign log. Returns the readings.
+/// Passes the parts of a stream through the decoder without a driver, as for a foreign log. Returns the readings.
 fn decoded(device: &dyn Device, parts: &[(MonoNs, &[u8])]) -> Vec<String> {
     let (mut decoder, mut readings) = (device.specification().decoder, Vec::new());
     for (received, bytes) in parts {
@@ -143,8 +143,8 @@ fn wake_until(driver: &mut dyn Driver, at: MonoNs, wire: &mut dyn Wire) {
     }
 }
 
-/// Draws the delay of one part of a stream. The delay is usually that of a good line. Sometimes it is that of a serial
-/// bridge, of a slow network, or of a network that fails for seconds.
+/// Draws the delay of one part of a stream. The delay is usually typical of a good line. Sometimes it is typical of a
+/// serial bridge, of a slow network, or of a network that fails for seconds.
 fn delay(random: &mut Random) -> DurNs {
     let ms = [1, 1, 3, 20, 66, 66, 120, 250, 1500, 4000];
     DurNs::from_millis(ms[random.below(ms.len())])
@@ -185,7 +185,8 @@ fn splits_and_delays_of_a_stream_do_not_change_readings_or_times() {
             let (mut parts, mut rest, mut at) = (Vec::new(), stream.as_slice(), START);
             while !rest.is_empty() {
                 let (now, later) = rest.split_at((1 + random.below(longest)).min(rest.len()));
-                // If parts are short, only some of them get a long delay, because the data otherwise lasts for hours.
+                // If parts are short, only some of them get a long delay, because otherwise the transmission of the
+                // data takes hours.
                 at = at
                     + if longest > 2 || random.one_in(50) {
                         delay(&mut random)

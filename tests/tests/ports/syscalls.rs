@@ -17,7 +17,7 @@ const SCENE: &str = "vehicle = \"vita2-4.toml\"\n[trajectory]\n
 [[trajectory.legs]]\ndistance_m = 40\nspeed_mps = 0.4\n";
 const PACKETS: usize = 40_000;
 
-/// Runs traced work between two system calls that mark its start and end. Nothing else makes the same calls.
+/// Runs the traced work between two system calls that mark its start and end. No other code makes these calls.
 fn marked<T>(work: impl FnOnce() -> T) -> T {
     std::hint::black_box(getppid());
     let done = work();
@@ -39,8 +39,8 @@ fn calls(trace: &str) -> (Vec<&str>, usize) {
             within = None;
             parts += 1;
         } else if within == Some(thread)
-            // Signals in the trace don't count. Neither does the line for the end of an interrupted call, because that
-            // call may be a mark.
+            // Signals in the trace don't count. The line for the end of an interrupted call doesn't count either,
+            // because the call may be a mark.
             && !call.starts_with("---")
             && !call.starts_with("<... ")
         {

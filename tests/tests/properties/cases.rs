@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use headrace_geometry::math;
 use headrace_tests::random::Random;
 
-/// Number of random cases that ordinary tests try of each subject. `SEED_OF_FEW` is the seed of the first case.
+/// Number of random cases of each subject that ordinary tests try. `SEED_OF_FEW` is the seed of the first case.
 const FEW: u64 = 3000;
 const SEED_OF_FEW: u64 = 20_260_901;
 /// Default number of cases in a long run, for all subjects together.
@@ -59,7 +59,7 @@ pub(crate) fn within(error: f64, bound: f64) -> bool {
 
 type Property<'a> = &'a dyn Fn(&mut Case) -> Result<(), String>;
 
-/// Runs `count` cases. Returns the cases that fail or panic, up to ten.
+/// Runs `count` cases of a property. Returns the cases that fail or panic, up to ten.
 fn failing(subject: &str, seed: u64, count: u64, property: Property<'_>) -> Vec<String> {
     let mut found = Vec::new();
     for number in 0..count {
@@ -87,7 +87,7 @@ pub(crate) fn few(subject: &str, property: Property<'_>) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
-/// Checks a property in a long run. It tries this subject's share of all cases.
+/// Checks a property in a long run, with this subject's share of all cases.
 #[track_caller]
 pub(crate) fn many(subject: &str, property: Property<'_>) {
     let number = |name: &str| {

@@ -1,5 +1,5 @@
-//! Device bytes with changed, lost and inserted bytes. All readings are finite. They don't depend on how the bytes are
-//! split into packets. The counts of bytes and frames add up.
+//! Device bytes with changed, lost and inserted bytes. All readings must be finite, and must not depend on how the
+//! bytes are split into packets. The counts of bytes and frames must add up.
 
 use headrace_config::Document;
 use headrace_devices::KINDS;
@@ -77,7 +77,7 @@ fn decoding(case: &mut Case, lines: &[Lines; 2]) -> Result<(), String> {
     if let Some(wrong) = whole.iter().find(|decoded| !decoded.reading.is_finite()) {
         return Err(format!("{wrong:?} of {bytes:02X?}"));
     }
-    // CAN frames, HID reports and I2C transactions arrive whole.
+    // CAN frames, HID reports and I2C transactions arrive whole, so their devices send no byte streams.
     let is_stream =
         !matches!(vehicle.sensor_configs[number].plugin.as_str(), "imu_can" | "tether_hid" | "bar100");
     if is_stream && (format!("{whole:?}") != format!("{split:?}") || counts != split_counts) {

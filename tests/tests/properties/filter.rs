@@ -1,4 +1,4 @@
-//! Random steps on a factored covariance. The covariance must stay valid, and each measurement must change its
+//! Random steps on a factored covariance. The covariance must stay valid, and each measurement must change the
 //! variances as the formula for scalars says.
 
 use headrace_fusion::filter::factors::Factors;

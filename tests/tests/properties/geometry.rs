@@ -5,8 +5,8 @@ use headrace_geometry::tunnel::{Profile, Yz, shapes};
 
 use crate::cases::{Case, few, many, within};
 
-/// Tolerance, m. On edges with a length of a micrometre, hits are exact to some nanometres only. The program subtracts
-/// nearly equal numbers to find on which side of the ray an end of the edge lies.
+/// Tolerance, m. On edges with a length of a micrometre, hits are exact to some nanometres only, because the program
+/// subtracts nearly equal numbers to find on which side of the ray an end of the edge lies.
 const OFF_M: f64 = 1e-8;
 
 /// Corners of a polygon that is star-shaped about (0, 3). Some corners coincide, or are 1e-12 or 1e-7 of a turn apart.

@@ -99,7 +99,8 @@ fn equations(case: &mut Case) -> Result<(), String> {
         return Err(format!("{steps} steps: {} and {}", spiral.pitch_m(), spiral.advance_m()));
     }
 
-    // A start angle lies within one turn. Turned back at the same rate, it gives the phase again.
+    // A start angle lies within one turn. If the head turns back by this angle at the same rate, the phase results
+    // again.
     let (phase, rate) = (case.between(0.0, TAU), case.between(0.1, 3.0));
     let (x, v) = (case.between(-2.0, 2.0), case.power_of_ten(-9.0, 1.0));
     if let Ok(start) = start_rad(phase, rate, x, v) {

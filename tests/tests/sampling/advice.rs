@@ -15,7 +15,7 @@ use headrace_tests::advised::{Advised, dive};
 use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
-/// Chainage at which dives begin, m. `JUDGED_M` is the length of the part that the test evaluates.
+/// Chainage at which dives begin, m. `JUDGED_M` is the length of the part of a dive that the test evaluates, m.
 const START_M: f64 = 5.0;
 const JUDGED_M: f64 = 10.0;
 /// If the median hole of a case exceeds this fraction of the predicted spacing T, sections must fail at a speed that is
@@ -36,7 +36,7 @@ struct Case {
     target_m: f64,
     aside_m: f64,
     yaw_deg: f64,
-    /// Id of a source that sends nothing during the dive, if any.
+    /// Id of the source that sends nothing during the dive, if there is one.
     dumb: Option<&'static str>,
     effects: &'static str,
     filter: bool,
@@ -87,8 +87,8 @@ const SWINGING: [Case; 6] = [
 ];
 
 impl Case {
-    /// Length of the stretch at either end of the dive in which the test ignores sections, m. They are ignored because
-    /// not all heads have passed them.
+    /// Length of the stretch at either end of the dive in which the test ignores sections, m, because not all heads
+    /// have passed there.
     fn ends_m(&self) -> f64 {
         1.2 * self.target_m + 1.0 + 8.0 * self.yaw_deg.to_radians()
     }
@@ -128,8 +128,8 @@ impl Case {
         dive(&self.scene(planned_mps, speed_mps, length_m), self.dumb, TICK)
     }
 
-    /// Speed at which the heads are in phase. It is the advised speed for the mode of the heads, if they are in phase
-    /// at just this speed.
+    /// Speed at which the heads are in phase. It is the speed that the advice gives for the mode of the heads, computed
+    /// for heads that are in phase at just this speed.
     fn planned_mps(&self) -> f64 {
         let first = dive(&self.scene(0.1, 0.1, 3.0), self.dumb, TICK);
         let alternatives = first.entries.last().unwrap().advice.alternatives;
@@ -221,8 +221,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
             let settled = &dive.settled()[..dive.settled().len() - BRAKING];
             settled.iter().filter(|entry| entry.advice.will_exceed).count() as f64 / settled.len() as f64
         };
-        // If heads are mounted at different places along the hull, the spacing T has a minimum at one speed. Even
-        // there, the rounding of counter and angles can keep T above the target.
+        // If heads are mounted at different places along the hull, the spacing T has a minimum at one speed. Even at
+        // this speed, the rounding of counts and angles can keep T above the target.
         let met = at.predicted_t_m <= case.target_m;
         within += usize::from(met);
         if met && forecast(&dives[0]) > 0.0 || forecast(&dives[1]) < 1.0 {
@@ -248,8 +248,8 @@ fn advised_speed_meets_the_target_but_a_speed_10_percent_higher_does_not() {
     assert!(near >= 8, "holes are near T in {near} cases only");
 }
 
-/// The vehicle misses sections because it is a third faster than advised. One screen shows the advised speed and the
-/// speed for repeating the missed sections, so the two must be similar.
+/// The vehicle misses sections because it is a third faster than advised. The same screen shows the advised speed and
+/// the speed for repeating the missed sections, so the two must be similar.
 #[test]
 fn speed_for_repeating_a_missed_section_is_within_5_percent_of_the_advice() {
     let sectors = |of: Case, target_m: f64| Case { layout: "sector_offset", target_m, ..of };
@@ -308,8 +308,8 @@ fn advice_compensates_lost_returns() {
     let mut broken = Vec::new();
     for case in &LOSSY {
         let sound_mps = Case { effects: "", ..*case }.planned_mps();
-        // The loop detects the losses only some turns after they began. This vehicle is slow, so that it hasn't moved
-        // far when they are detected.
+        // The loop detects the losses only some turns after they began. The vehicle drives at half this speed at first,
+        // so that it hasn't moved far when the losses are detected.
         let v_max_mps = case.dive(sound_mps, 0.5 * sound_mps).median(v_max_mps);
         let dives = [v_max_mps, sound_mps].map(|speed_mps| case.dive(sound_mps, speed_mps));
         let [at, as_before] = [0, 1].map(|k| Judged::of(case, &dives[k]));
@@ -332,7 +332,7 @@ fn advice_compensates_lost_returns() {
                 case.what, as_before.passing
             ));
         }
-        // One screen shows the speed limit and the speed for repeating sections, so the two must be similar.
+        // The same screen shows the speed limit and the speed for repeating sections, so the two must be similar.
         if !(0.5..2.0).contains(&(again / v_max_mps)) {
             broken.push(format!(
                 "{}: the repeat speed is {again:.4} m/s, but {v_max_mps:.4} is advised",
@@ -391,7 +391,7 @@ fn a_minute(entries: &[AdviceEntry], changed: impl Fn(&AdviceEntry, &AdviceEntry
 #[test]
 fn advice_in_the_field_changes_slowly_enough_to_read() {
     let text = include_str!("../../../deploy/scenes/vita1-field.toml").replace("../vehicles/", "");
-    // The scene is changed to a speed at which about half of the updates meet the target.
+    // The speed in the scene is changed, so that about half of the updates meet the target.
     let shorter = text.replace("distance_m = 130\nspeed_mps = 0.16", "distance_m = 50\nspeed_mps = 0.197");
     assert_ne!(text, shorter);
     let scene = scenes::scene(&shorter);

@@ -1,4 +1,4 @@
-//! In calm dives, `plan` and the live advice agree on position errors and speeds.
+//! In calm dives, the command `plan` and the live advice agree on position errors and speeds.
 
 use headrace_devices::KINDS;
 use headrace_sampling::margin::{APART_SHARE, error_time_s};
@@ -44,7 +44,7 @@ fn plan_and_live_position_errors_agree() {
     }
 }
 
-/// Some of the dives of `cargo bench --bench advice`. All of them are steady except the last one.
+/// The dives are some of those in `cargo bench --bench advice`. All of them are steady except the last one.
 #[test]
 fn advised_speeds_match_the_largest_passing_speeds() {
     let mut ratios = Vec::new();
@@ -58,7 +58,7 @@ fn advised_speeds_match_the_largest_passing_speeds() {
     assert!(ratios.iter().all(|ratio| (0.899..1.001).contains(ratio)), "{ratios:?}");
 }
 
-/// The vehicle drives at several speeds near the advised one. The advice must be the same in all these dives.
+/// In each dive, the vehicle drives at another speed near the advised speed. The advice must be the same in all dives.
 #[test]
 fn advice_does_not_depend_on_the_driven_speed() {
     let outing = Outing::steady(VEHICLES[3], 1);

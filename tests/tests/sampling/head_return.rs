@@ -1,6 +1,6 @@
 //! The advised speed while a head is silent and after its return, in simulated dives of the shipped vehicles.
 //!
-//! `core/sampling/src/advice/tests/silence.rs` has more faults, without a loop.
+//! `core/sampling/src/advice/tests/silence.rs` tests more faults, but without a loop.
 
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_monitor::App;
@@ -69,7 +69,8 @@ fn displayed_limit_falls_once_while_a_head_is_silent_and_rises_once_after_its_re
     ] {
         let (_, from_s, for_s) = fault;
         let all = seen(vehicle, speed_mps, fault);
-        // Silence is noticed after 2 s, and a return after a second.
+        // The loop notices silence after 2 s, and the head's return after a second. Both limits have a margin of half a
+        // second.
         let (noticed_s, back_s) = (from_s + 2.5, from_s + for_s + 1.5);
         let spans_s = [(from_s - 5.0, from_s + 1.9), (noticed_s, from_s + for_s), (back_s, f64::INFINITY)];
         let [before, silent, after] = spans_s.map(|(from_s, to_s)| {

@@ -1,9 +1,9 @@
 //! The table of ideal scenes. The tests cover all steps from scene to bytes, log and report.
 //!
 //! The table has the modes SLOW to FASTEST with 1, 2 and 4 phase-shifted heads at 0.197 m/s. All heads are at the
-//! centre of the circle in the `ceran` profile. The mean distance between passes must be the distance per turn, v T,
-//! divided by the number of heads s, within 0.5 %. The largest hole over nine metres must be within 0.1 % of its value
-//! in the table. Those values were computed independently from Delaunay circumcircles.
+//! centre of the circle in the `ceran` profile. The mean distance between passes must be v T / s within 0.5 %, where v
+//! T is the distance per turn and s the number of heads. The largest hole over nine metres must be within 0.1 % of its
+//! value in the table. Those values were computed independently from Delaunay circumcircles.
 
 use std::fmt::Write as _;
 use std::path::Path;

@@ -1,7 +1,8 @@
 //! Interleaving of several heads by the paper's §5. The tests step the heads ping by ping along a straight tunnel.
 //!
 //! The tests collect the chainages at which each head looks at a given angle. Each head is stepped by its own
-//! ping-by-ping schedule (`HeadProgram`). The layout formulas are therefore not checked against themselves.
+//! ping-by-ping schedule (`HeadProgram`). The formulas for the layout of the heads are therefore not checked against
+//! themselves.
 
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::math::{PI, TAU, floor_to_i64};
@@ -66,7 +67,7 @@ impl Rig {
     }
 
     /// Simulates a dive at `speed_mps` with heads laid out for `planned_mps`. The dive is longer than the hull by the
-    /// distance covered in some turns.
+    /// distance that the vehicle covers in some turns.
     fn dive(&self, layout: HeadLayout, planned_mps: f64, speed_mps: f64) -> Dive {
         let [back_m, front_m] = ends(&self.hull_m);
         let ping_m = speed_mps * self.ping_s();
@@ -155,7 +156,7 @@ impl Track {
 
 struct Dive {
     tracks: Vec<Track>,
-    /// First and last chainage that all heads have passed, m.
+    /// First and last chainage of the stretch that all heads have passed, m.
     shared_m: [f64; 2],
 }
 
@@ -191,8 +192,8 @@ impl Dive {
         }
     }
 
-    /// Checks that only head `k` passes the angles of its sector, and that the distances between its passes alternate
-    /// between two values.
+    /// Checks that only head `k` passes the angles of its sector, and that the distances between this head's passes
+    /// alternate between two values.
     fn assert_two_distances(&self, k: usize, pitch_m: f64) {
         let heads = self.tracks.len();
         for share in [0.0, 0.03, 0.25, 0.4, 0.5, 0.75, 0.9, 1.0] {
@@ -266,7 +267,8 @@ fn sector_heads_stay_in_phase_and_their_pass_distances_alternate() {
             dive.assert_in_step(1e-7);
             for k in 0..heads {
                 dive.assert_two_distances(k, pitch_m);
-                // At the border of two sectors, the heads of both turn back. They do so at evenly spaced chainages.
+                // At the border of two sectors, the heads of both sectors turn back. They do so at evenly spaced
+                // chainages.
                 dive.assert_even(TAU * (k + 1) as f64 / heads as f64, pitch_m / heads as f64);
             }
             // If the distances between heads aren't whole numbers of pings, a head may reach the end of its sector up
@@ -343,8 +345,8 @@ fn pass_gaps_above_the_planned_speed_differ_by_the_phase_errors() {
 
 proptest! {
     #![proptest_config(ProptestConfig {
-        // The random seed is fixed. With other seeds, one start angle in a million is so close to a step that rounding
-        // decides which ping reaches it.
+        // The random seed is fixed. With other seeds, about one start angle in a million is so close to a step of the
+        // head that rounding decides which ping reaches it.
         cases: 100, failure_persistence: None, rng_seed: RngSeed::Fixed(881), ..ProptestConfig::default()
     })]
 
@@ -354,7 +356,7 @@ proptest! {
         rig.dive(PhaseShift, speed_mps, speed_mps).assert_even(angle, apart_m);
     }
 
-    /// The driven speed differs from the planned one, so that the gaps between passes are not all equal.
+    /// The driven speed differs from the planned speed, so that the gaps between passes are not all equal.
     #[test]
     fn shifting_or_reversing_all_heads_does_not_change_the_pass_gaps(
         rig in random_rig(), layout in prop::sample::select(vec![PhaseShift, SectorOffset]),

@@ -1,9 +1,9 @@
 //! Sampling theory compared with values of 50 digits, which `oracles/sampling.py` computed with mpmath
 //! (`oracles/sampling.csv`).
 //!
-//! The inputs are doubles and count as exact. The tolerance therefore covers only the rounding in the computation. It
-//! is some units in the last place. If the computation magnifies the rounding of an intermediate value, the tolerance
-//! is multiplied by the condition number.
+//! The inputs are doubles and count as exact. The tolerance therefore covers only the rounding in the computation,
+//! which is some units in the last place. If the computation magnifies the rounding of an intermediate value, the
+//! tolerance is multiplied by the condition number.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Tunnel, Vec3};
 use headrace_geometry::math::{self, FRAC_PI_2, TAU};
@@ -27,7 +27,7 @@ struct Row {
 }
 
 impl Row {
-    /// Input number `i` of a row of `oracles/sampling.csv`. Inputs are numbered from 1, as in the file's header.
+    /// Input number `i` of a row of `oracles/sampling.csv`. Inputs are numbered from 1, as in the header of this file.
     fn i(&self, i: usize) -> f64 {
         self.inputs[i - 1]
     }
@@ -105,7 +105,7 @@ fn wall_steps_near_90_degrees_match_the_oracle() {
     found_at("sampling.corner", magnified, worst, 8.0 * ULP);
 }
 
-/// If the ping distance T_y is close to the target, a formula that subtracts the squares of the two loses digits.
+/// If the ping distance T_y is close to the target, a formula that subtracts their squares loses digits.
 #[test]
 fn speeds_near_the_limit_match_the_oracle() {
     let (mut worst, mut magnified) = (0.0_f64, 0.0_f64);

@@ -12,7 +12,8 @@ const PLANNED_MPS: f64 = 0.197;
 
 /// Advice in a dive at constant speed, without the first seconds.
 ///
-/// No effect disturbs the sensors. The vehicle has no filter, because a filter adds a margin for cable slack.
+/// No effect disturbs the sensors. The vehicle has no navigation filter, because the filter adds a margin for cable
+/// slack.
 fn advice(speed_mps: f64, vehicle: &str) -> Vec<Value> {
     let folder = Folder::new();
     let direct = "[navigation]\nway = \"direct\"\n";

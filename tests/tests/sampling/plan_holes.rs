@@ -2,7 +2,7 @@
 //!
 //! The test steps the heads by their schedule, casts their beams, and searches the largest empty circle. To find
 //! occlusion by the vehicle, it follows each beam in small steps. The search can only underestimate the circle, so no
-//! circle that it finds may exceed the planned size. Neither may the planned size be far larger than the circle,
+//! circle that it finds may exceed the planned size. The planned size may not be far larger than the circle either,
 //! because the crew then drives more slowly than necessary.
 
 use headrace_geometry::frames::{Body, Mount, Point3, Pose, Rot, Vec3};
@@ -19,8 +19,8 @@ const MODES: [(&str, f64, f64); 3] = [("medium", 0.6, 10.8), ("fast", 0.9, 8.0),
 
 type Head = (HeadSpec, Vec<HeadMode>);
 
-/// A head mounted at `place` on the vehicle. It faces forward or aft, and its turn time is longer than that of the mode
-/// by the factor `slower`.
+/// A head mounted at `place` on the vehicle. It faces forward or aft, and its turn time is the turn time of the mode
+/// times the factor `slower`.
 fn head(place: [f64; 3], aft: bool, radius_m: f64, slower: f64) -> Head {
     let mode = |(name, step_deg, turn_s): (&'static str, f64, f64)| HeadMode {
         name,
@@ -87,8 +87,8 @@ const STEP_M: f64 = 0.002;
 /// Largest distance between a head and a part of the vehicle, m.
 const VEHICLE_M: f64 = 1.6;
 
-/// Whether the vehicle hides the wall from a beam. Follows the beam in steps. A head's own body hides nothing, and
-/// neither does a box that contains the head.
+/// Whether the vehicle hides the wall from a beam. Follows the beam in steps. A head's own body hides nothing, and a
+/// box that contains the head hides nothing either.
 fn is_hidden(inspection: &Inspection, number: usize, angle_rad: f64) -> bool {
     let (spec, _) = &inspection.heads[number];
     let from = spec.mount.position;
@@ -147,7 +147,7 @@ fn samples(planner: &Planner, mode: usize, speed_mps: f64, length_m: f64, way: W
     samples
 }
 
-/// Samples in square cells for a nearest-neighbour search with cyclic arc length.
+/// Samples, sorted into square cells for a search of the nearest sample. The arc length is cyclic.
 struct Wall {
     cells: Vec<Vec<[f64; 2]>>,
     from_m: f64,
@@ -210,7 +210,7 @@ impl Wall {
         best
     }
 
-    /// Diameter of the largest empty circle found with a centre from `from_m` to `to_m`, m.
+    /// Diameter of the largest empty circle that the search finds with a centre between `from_m` and `to_m`, m.
     fn hole_m(&self, from_m: f64, to_m: f64, grid_m: f64) -> f64 {
         let across = math::floor_to_i64((to_m - from_m) / grid_m);
         let around = math::floor_to_i64(self.perimeter_m / grid_m);
@@ -335,7 +335,8 @@ fn planned_hole_size_is_an_upper_bound_for_an_askew_vehicle() {
 
 #[test]
 fn planned_hole_size_is_an_upper_bound_for_a_swinging_or_drifting_vehicle() {
-    // An oscillation with an amplitude of 5 degrees and a period of 30 s has a rate of at most 1.05 degrees per second.
+    // An oscillation of the heading with an amplitude of 5 degrees and a period of 30 s has a rate of at most 1.05
+    // degrees per second.
     let swings = |yaw_deg: f64, rate_degps: f64, heads| Inspection {
         yaw_rad: yaw_deg.to_radians(),
         yaw_rate_radps: rate_degps.to_radians(),
@@ -344,8 +345,8 @@ fn planned_hole_size_is_an_upper_bound_for_a_swinging_or_drifting_vehicle() {
     let swinging = |heads| swings(5.0, 1.05, heads);
     let swing: Way = |t| (0.0, f64::to_radians(5.0) * math::sin(TAU * t / 30.0));
     // The oscillation has an amplitude of 15 degrees and a period of 20 s. At its largest rate, the heading would
-    // change by 51 degrees in a turn of MEDIUM. It can change by at most 30 degrees, however, because this is the whole
-    // swing.
+    // change by 51 degrees in a turn of MEDIUM. It can change by at most 30 degrees, however, because the whole
+    // oscillation is 30 degrees wide.
     let swing_wide: Way = |t| (0.0, f64::to_radians(15.0) * math::sin(TAU * t / 20.0));
     let drifting = |heads| Inspection { drift_m: 1.5, ..ceran(heads, PhaseShift) };
     hold(

@@ -1,12 +1,12 @@
-//! A vehicle that yaws by ten degrees gets a speed at which its sections pass.
+//! A vehicle that yaws by ten degrees gets the advice to drive at a speed at which its sections pass.
 
 use headrace_monitor::advice_log::AdviceEntry;
 use headrace_sampling::advice::Remedy;
 use headrace_tests::field_table::VEHICLES;
 use headrace_tests::passable::Outing;
 
-/// With ten degrees of yaw, some successive passes are farther apart than the target at any speed, but the passes of
-/// later swings fill the gaps. Sections pass at the advised speed, but not at 2.5 times that speed.
+/// With ten degrees of yaw, some successive passes are farther apart than the target at any speed, but passes during
+/// later swings fill the gaps. Sections must pass at the advised speed, but not at 2.5 times that speed.
 #[test]
 fn advised_speed_of_a_swinging_vehicle_is_positive_and_passes() {
     for target_m in [0.5, 1.0] {

@@ -1,5 +1,5 @@
-//! A simulated pilot who gets advice. The pilot drives too fast, sees the missed stretch, goes back, and leaves no
-//! missed section.
+//! A simulated pilot who gets the monitor's advice. The pilot drives too fast, sees the missed stretch on the display,
+//! goes back, and leaves no missed section.
 
 use headrace_coverage::Verdict;
 use headrace_simulator::{Message, Scene, Simulation};
@@ -64,7 +64,7 @@ fn pilot_keeps_to_the_advised_speed_within_tolerance() {
     let way = way(&scene);
     let report = truth::dive(&scene).report;
     let advice = &report.advice;
-    // In these seconds of the dive, the vehicle is moving steadily.
+    // In the seconds 40 to 100 of the dive, the vehicle is moving steadily.
     for (second, pair) in way.windows(2).enumerate().skip(40).take(60) {
         let speed_mps = pair[1] - pair[0];
         let about = advice.iter().filter(|entry| (entry.at_s - second as f64).abs() < 12.0);

@@ -1,4 +1,4 @@
-//! If the largest hole is D, every boulder of size D is hit at least once, and every boulder of size 2 D at least
+//! If the largest hole is D, beams hit every boulder of size D at least once, and every boulder of size 2 D at least
 //! twice.
 //!
 //! A thousand boulders lie on the wall of a simulated tunnel. D is the hole that the loop reports for the same section
@@ -77,7 +77,7 @@ fn boulders_of_size_d_are_hit_at_least_once_and_of_size_2_d_at_least_twice() {
     assert!(least(&of_d) >= 1, "{} boulders of D missed", of_d.iter().filter(|hits| **hits == 0).count());
     let of_two_d = hits(&holes, 2, 2.02..2.2);
     assert!(least(&of_two_d) >= 2, "a boulder of 2 D was hit {} times", least(&of_two_d));
-    // Boulders that are much smaller than the holes are missed. This shows that the tests above can fail.
+    // Boulders that are much smaller than the holes are missed, which proves that the tests above can fail.
     let small = hits(&holes, 3, 0.3..0.4);
     assert!(small.iter().filter(|hits| **hits == 0).count() > COUNT / 20, "the reported holes are too large");
 }

@@ -15,7 +15,7 @@ fn folder() -> Folder {
     folder
 }
 
-/// Messages that each source sends in the short dive with these simulator effects.
+/// Messages that each source sends in the short dive with the simulator effects `effects`.
 fn lines(folder: &Folder, effects: &str, further: &[&str]) -> Lines {
     folder.write("scene.toml", format!("{SCENE}\n[effects]\n{effects}\n"));
     let arguments = [&["simulate", "scene.toml", "-o", "dive.mcap"], further].concat();
@@ -168,8 +168,8 @@ fn implied_effects_are_listed_with_reasons_and_simulated_only_on_request() {
     assert_eq!(lines(&folder, described, &[]), plain);
 }
 
-/// The report must show no influence for one effect and a large influence for another. It also shows the CPU time of
-/// each effect.
+/// The report must show that one effect has no influence and another has a large influence. It must also show the CPU
+/// time of each effect.
 #[test]
 fn explain_worth_option_reports_which_effects_change_the_result() {
     let folder = folder();
@@ -194,7 +194,7 @@ fn explain_worth_option_reports_which_effects_change_the_result() {
     assert!(one.code == Some(2) && one.stderr.contains("seeds"), "{}", one.stderr);
 }
 
-/// Checks that the simulation of a scene exits with code 2 and prints these words.
+/// Checks that the simulation of a scene exits with code 2 and prints the words `words`.
 #[track_caller]
 fn refused(scene: &str, words: &[&str]) {
     let folder = folder();
@@ -273,8 +273,8 @@ fn report_finds_the_simulated_clock_drifts() {
     }
 }
 
-/// If the speed of sound in the vehicle file is wrong by 3.7 %, the wall shifts by 11 cm. The depth sensor's
-/// temperature corrects the speed, and the wall is right.
+/// If the speed of sound in the vehicle file is wrong by 3.7 %, the wall shifts by 11 cm. The temperature that the
+/// depth sensor measures corrects the speed, and the wall is then right.
 #[test]
 fn water_temperature_corrects_a_wrong_speed_of_sound() {
     let folder = folder();
@@ -306,7 +306,7 @@ fn water_temperature_corrects_a_wrong_speed_of_sound() {
     assert!((1447.0..1449.0).contains(&least_mps) && most_mps < 1449.0, "{least_mps} to {most_mps}");
 }
 
-/// Tells for each ping of a head whether this effect alone removes or displaces the ping's return.
+/// Tells for each ping of a head whether the effect `effect` alone removes or displaces the ping's return.
 fn touched(effect: &str) -> Vec<bool> {
     let ranges = |effects: &str| -> Vec<Option<f64>> {
         let scene = format!("{SCENE}\n[effects]\n{effects}\n");

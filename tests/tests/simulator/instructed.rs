@@ -1,5 +1,5 @@
-//! A simulated pilot who follows only the most prominent instructions, in dives with faulty devices. Little wall is
-//! missed at the end.
+//! A simulated pilot who follows only the most prominent instructions, in dives with faulty devices. At the end, little
+//! wall may be missed.
 //!
 //! 50 dives: `cargo test -p headrace_tests --test simulator instructed -- --ignored --nocapture`
 
@@ -24,13 +24,13 @@ use headrace_tests::scenes;
 
 const TICK: DurNs = DurNs(20_000_000);
 
-/// A pilot's screen. The pilot reads the action of the condition, and that of the first alert.
+/// A pilot's screen. The pilot reads the action that the condition states, and the action of the first alert.
 struct Screen {
     dive: Loop,
     ports: Vec<Option<Port>>,
     until: MonoNs,
     read: Vec<PilotAdvice>,
-    /// Metres by verdict at present.
+    /// Present length of the wall with each verdict, m.
     metres: Arc<Mutex<Metres>>,
 }
 
@@ -39,7 +39,8 @@ fn speed_mps(instruction: &str) -> Option<f64> {
     instruction.strip_suffix(" m/s")?.rsplit(' ').next()?.parse().ok()
 }
 
-/// Actions of a pilot who reads only the most prominent instructions; `None` before the first advice update of a tick.
+/// Advice as understood by a pilot who reads only the most prominent instructions; `None` before the first advice
+/// update of a tick.
 fn read(dive: &Loop) -> Option<PilotAdvice> {
     let view = dive.view();
     let at = view.advised().entries.last()?.at;
@@ -111,7 +112,7 @@ fn faults(seed: u64) -> String {
     (0..=usize::try_from(seed % 3).unwrap()).map(fault).collect()
 }
 
-/// Metres by verdict at the end of a dive with these faults.
+/// Length of the wall with each verdict at the end of a dive with the faults `faults`, m.
 fn metres(faults: &str) -> Metres {
     let scene = scenes::scene(&format!(
         "vehicle = \"vita2-4.toml\"\n[vehicle_changes]\nheads.planned_speed_mps = 0.09\n[trajectory]\nkind = \"advised\"\n\
@@ -125,7 +126,7 @@ fn metres(faults: &str) -> Metres {
     *metres.lock().unwrap()
 }
 
-/// Runs dives with these seeds. At most `most_m` metres may be missed in all of them together.
+/// Runs dives with these seeds. In all dives together, at most `most_m` metres may be missed.
 #[track_caller]
 fn check(seeds: core::ops::Range<u64>, most_m: f64) {
     let mut missed_m = 0.0;
@@ -145,7 +146,7 @@ fn pilot_following_the_main_instructions_misses_no_wall_despite_faults() {
     check(0..5, 0.0);
 }
 
-/// Of 11 m per dive.
+/// Each of the 50 dives is 11 m long.
 #[test]
 #[ignore = "long: 50 dives"]
 fn pilot_following_the_main_instructions_misses_at_most_2_m_in_50_dives_with_faults() {

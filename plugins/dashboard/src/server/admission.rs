@@ -36,7 +36,7 @@ pub(super) struct Admitted {
 pub(super) enum Denied {
     /// The request has no token, or only wrong ones.
     NoToken,
-    /// The client has sent too many wrong tokens, so the request's token isn't compared.
+    /// The client has sent too many wrong tokens, so the token of this request isn't checked.
     Spent,
 }
 

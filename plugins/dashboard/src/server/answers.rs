@@ -121,7 +121,7 @@ async fn missing() -> Response {
 /// Returns the page to any client, without a token.
 ///
 /// The page itself asks for the token. The status is never an error, because programs that frame the page retry for
-/// ever then.
+/// ever after an error.
 async fn page() -> Response {
     ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], assets::index()).into_response()
 }
@@ -139,9 +139,10 @@ async fn asset(Path(path): Path<String>) -> Response {
 
 /// Checks a token, and stores it in the browser as a cookie.
 ///
-/// Only this token counts. A cookie sent with the request is from an earlier login and is ignored.
+/// Only the token in the request's query counts. A cookie sent with the request is from an earlier login and is
+/// ignored.
 async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMap, uri: Uri) -> Response {
-    // Relative, because a proxy may serve the page below a path.
+    // The address is relative, because a proxy may serve the page below a path.
     let home = [(header::LOCATION, "./")];
     if shared.access.tokens.is_none() {
         return (StatusCode::SEE_OTHER, home).into_response();

@@ -79,7 +79,7 @@ impl Budgets {
         true
     }
 
-    /// Returns unused requests to a client's budget.
+    /// Gives back requests that a client took from its budget but did not use.
     pub(crate) fn give_back(&self, client: Client, count: usize) {
         let mut left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(left) = left.get_mut(&client) {

@@ -186,7 +186,7 @@ impl Page {
         let _ended = self.sender.blocking_send(Fed::End(Box::new(end)));
     }
 
-    /// Ends the page. Within a second, viewers get the last messages, and `end` after all others.
+    /// Ends the page. Within a second, viewers get the remaining messages, and `end` as the last of them.
     pub fn end(mut self, end: Option<serde_json::Value>) {
         if let Some(end) = end {
             self.show_result(end);
@@ -238,7 +238,7 @@ async fn serve(
 ) {
     let pump = pump::pump(fed, Arc::clone(&shared));
     let serving = tokio::spawn(listener::accept(listener, tls, Arc::clone(&shared)));
-    // The pump returns when the page is to end.
+    // The task `pump` ends when the page has to end.
     pump.await;
     drop(shared.fan().take());
     let gone = async {

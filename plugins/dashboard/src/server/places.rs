@@ -34,7 +34,7 @@ struct Held {
 
 /// A connection's place among the limited number of places. The place is freed on drop.
 pub(super) struct Place {
-    /// Tells the connection to close, and identifies the connection's place.
+    /// Tells the connection to close. It also identifies the connection's place.
     key: Arc<Notify>,
     places: Arc<Places>,
     shown: Mutex<Option<(Client, Role)>>,

@@ -92,7 +92,7 @@ fn send(shared: &Shared, messages: Vec<Message>) {
     if !messages.is_empty()
         && let Some(fan) = &*shared.fan()
     {
-        // Sending fails if there is no viewer. This needs no action.
+        // Sending fails if there is no viewer. The failure needs no action.
         let _nobody = fan.send(messages.into());
     }
 }

@@ -67,7 +67,7 @@ impl Served {
         stream
     }
 
-    /// Connects a client whose kernel buffers about this many unread bytes.
+    /// Connects a client whose kernel buffers about `bytes` unread bytes.
     fn connect_with_buffer(&self, bytes: usize) -> TcpStream {
         let socket = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
         socket.set_recv_buffer_size(bytes).unwrap();
@@ -84,7 +84,7 @@ impl Served {
         of(&self.page.shared.counts).load(Ordering::Relaxed)
     }
 
-    /// Sends a message of this many bytes to all viewers.
+    /// Sends a message of `bytes` bytes to all viewers.
     fn feed(&self, bytes: usize) {
         let body = Body::Text(format!("{{\"type\":\"test\",\"text\":\"{}\"}}", "x".repeat(bytes)).into());
         let batch = vec![Message { seq: 1, sort: Sort::Other, body }];
@@ -159,7 +159,7 @@ fn operator_is_served_within_1_s_among_1000_connections() {
             let mut socket = served.connect();
             assert_eq!(ask(&mut socket, "GET /feed", &format!("{OPERATOR}{UPGRADE}"), "").0, 101);
             longest = longest.max(began.elapsed());
-            // An operator may send 20 actions a second.
+            // An operator may send only 20 actions a second, so the client pauses.
             std::thread::sleep(Duration::from_millis(50));
         }
     }
@@ -245,8 +245,8 @@ fn unread_streams_are_dropped_10_s_after_their_machine_takes_no_more_data() {
     }
     println!("dropped after {dropped:.1?} s: WebSocket, lines with a small buffer and with the usual one");
     assert_eq!(dropped.len(), unread.len());
-    // At first the clients' kernels take up to some 200 kB, depending on the machine. The server counts these bytes as
-    // sent, although no client has read them.
+    // At first the kernels of the clients take some 200 kB at most, depending on the machine. The server counts these
+    // bytes as sent, although no client has read them.
     assert!(dropped[0] < 15.0 && dropped[2] < 40.0, "{dropped:?}");
     assert_eq!(served.page.viewers(), 0);
 }

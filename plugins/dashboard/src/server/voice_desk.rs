@@ -14,7 +14,7 @@ const MOST_BEGUN: usize = 32;
 /// Maximum size of recordings kept in memory for playing, bytes. The oldest are dropped from memory but stay in the
 /// log.
 const MOST_HELD_BYTES: usize = 16 << 20;
-/// Maximum number of recordings that are uploaded at the same time.
+/// Maximum number of recordings that clients may upload at the same time.
 const MOST_COMING: usize = 2;
 /// Budget of recordings' uploads: burst, and refill per second.
 const RATE: (f64, f64) = (8.0, 0.2);
@@ -119,7 +119,7 @@ impl Desk {
         Ok(())
     }
 
-    /// Returns the recording of a note, from memory or from the log.
+    /// Returns the recording of a voice note, from memory or from the log.
     pub(super) async fn recall(&self, id: u32, at_s: f64) -> Result<Option<Arc<Voice>>, Refusal> {
         let Voices::Recalled(recall) = &self.to else { return Ok(self.get(id)) };
         // Only one search runs at a time, because each search may read much of a log.

@@ -18,7 +18,7 @@ use crate::access::query;
 /// Timeout of a recording's upload: 512 KiB at 10 kB/s.
 const COMES_WITHIN: Duration = Duration::from_mins(1);
 
-/// Receives the recording of a voice note that was begun over the feed.
+/// Receives the recording of a voice note that an operator has begun by a message on the feed.
 pub(super) async fn take(
     State(shared): Here,
     Path(id): Path<String>,

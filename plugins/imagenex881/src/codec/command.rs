@@ -14,7 +14,7 @@ pub const RANGES_M: [u8; 13] = [1, 2, 3, 4, 5, 10, 20, 30, 40, 50, 60, 80, 100];
 const HEADER: [u8; 2] = [0xFE, 0x44];
 /// Byte that terminates a command. It must not occur elsewhere in the command.
 const TERMINATOR: u8 = 0xFD;
-/// Bits of the mode byte of a command: transmit (bit 0), send data (bit 1), slave (bit 6).
+/// Bits set in the mode byte of a command: transmit (bit 0), send data (bit 1), slave (bit 6).
 const SLAVE: u8 = 0x43;
 const REVERSE: u8 = 0x40;
 /// Reply rate code for 115200 baud. No other code is known.
@@ -24,7 +24,7 @@ const STEP_CODES: [u8; 6] = [0, 1, 2, 3, 4, 8];
 /// Number of echo points in a return.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Points {
-    /// Nominally 250 points. Returns with 8-bit points (`IMX`) have 252.
+    /// Nominally 250 points. A return with 8-bit points (`IMX`) has 252.
     P250,
     /// 500 points (`IGX`).
     P500,
@@ -37,7 +37,7 @@ pub struct Command {
     pub head_id: u8,
     /// Range setting, m: one of [`RANGES_M`].
     pub range_m: u8,
-    /// Whether the head reverses its stepping direction, once.
+    /// Whether the head reverses its stepping direction at this command.
     pub reverse: bool,
     /// Gain at the start of the ping, 0 to 40 dB.
     pub start_gain_db: f64,

@@ -52,8 +52,8 @@ impl Tag {
         }
     }
 
-    /// Whether the return is from a GS model. GS models add fields after the common header. Only one source
-    /// describes these fields.
+    /// Whether the return is from a GS model. GS models add fields after the common header. Only one published source
+    /// describes the added fields.
     pub const fn is_gs(self) -> bool {
         matches!(self, Self::Ina | Self::Inb | Self::Inc)
     }

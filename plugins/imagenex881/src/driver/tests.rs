@@ -13,7 +13,7 @@ use crate::settings::tests::settings;
 use crate::stepping::Head;
 
 const BEGUN: MonoNs = MonoNs(2_000_000_000);
-/// Pause within an answer that never ends.
+/// Pause within an answer, so long that the rest of the answer never arrives.
 const STALLS: DurNs = DurNs(i64::MAX);
 const LATENCY: DurNs = DurNs(9_000_000);
 
@@ -42,7 +42,7 @@ struct Rig {
     answers: usize,
     /// Whether the latest answer has been duplicated.
     doubled: bool,
-    /// Time and position of each ping whose return was delivered and has the dive's range setting.
+    /// Time and position of each ping whose return was delivered to the host and has the dive's range setting.
     pings: Vec<(MonoNs, u16)>,
     delivered: Vec<u8>,
 }
@@ -172,7 +172,8 @@ impl Rig {
         }
     }
 
-    /// Asserts that consecutive pings after `from` are at most one step apart, or two steps at the `lost` pings.
+    /// Asserts that consecutive pings after `from` are at most one step apart. At most `lost` of the distances may be
+    /// two steps.
     fn assert_gapless(&self, from: MonoNs, lost: usize) {
         let step = i32::from(self.driver.settings.step_counts);
         let after: Vec<i32> = self.pings.iter().filter(|p| p.0 >= from).map(|p| i32::from(p.1)).collect();

@@ -27,7 +27,7 @@ fn run(text: &str, latency: DurNs, program: HeadProgram, pings: usize) -> Run {
     let mut run = Run { sent: Vec::new(), received: Vec::new(), readings: Vec::new() };
     let mut due = Vec::new();
     let last = start + DurNs(settings.ping_period.0 * (pings as i64 - 1));
-    // The emulator's `begin` is called twice in this run, and still gives each ping once.
+    // The emulator's `begin` is called twice in this run, and each ping must still be emitted only once.
     emulator.begin(start + DurNs(settings.ping_period.0 / 2), &mut due);
     emulator.begin(last + DurNs(1), &mut due);
     for sounding in due {

@@ -16,7 +16,7 @@ use crate::codec::can_frame;
 use crate::frame::{CanFrame, CanId, FRAME_BYTES, FrameKind};
 
 /// Maximum number of frames that a mapping uses. Each signal may have its own frame: 3 of rate, 3 of force, 4 of
-/// attitude, 4 states and a time.
+/// attitude, 4 of validity and 1 of time.
 const MOST_FRAMES: usize = 15;
 
 /// Maximum time between the frames of one sample. A unit sends these frames back to back, so a longer gap means another
@@ -79,7 +79,7 @@ stateful!(Vector<4> { slots: came; fixed: parts; });
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Mixed;
 
-/// Validity of a quantity as reported by the unit. Values count as valid until the unit reports otherwise.
+/// Validity of a quantity as reported by the unit. Values count as valid until the unit reports that they aren't.
 #[derive(Debug, Clone, Copy)]
 struct Well {
     condition: Option<Condition>,
@@ -246,7 +246,7 @@ impl<const N: usize> Vector<N> {
         Self { parts, came: [None; N] }
     }
 
-    /// Stores the components in this frame; returns the vector in SI units once it is complete.
+    /// Stores the vector's components that this frame carries; returns the vector in SI units once it is complete.
     ///
     /// Errors: the components are from different samples. The older components are dropped.
     fn take(

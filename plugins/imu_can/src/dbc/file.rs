@@ -121,7 +121,7 @@ pub struct Signal {
     pub place: Place,
 }
 
-/// Location of a signal in frames, and its conversion to a number.
+/// Location of a signal in CAN frames, and the conversion of its bits to a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Identifier of the frames that contain the signal.
@@ -132,7 +132,7 @@ pub struct Place {
     pub layout: Layout,
     /// Number format of the signal.
     pub bits: Bits,
-    /// Factor of the conversion value = bits x factor + offset, in the signal's unit.
+    /// Factor of the conversion "value = bits x factor + offset", in the signal's unit.
     pub factor: f64,
     /// Offset of the conversion; see `factor`.
     pub offset: f64,

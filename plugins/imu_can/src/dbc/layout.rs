@@ -47,7 +47,7 @@ impl Layout {
         let all = 8 * u32::try_from(data_bytes.min(DATA_BYTES)).ok()?;
         let start = u32::try_from(start).ok().filter(|start| *start < all)?;
         let bits = u32::try_from(size).ok().filter(|bits| (1..=all).contains(bits))?;
-        // Number of data bits before the signal's first bit, in the signal's bit order.
+        // Number of bits that precede the signal in the frame's data, counted in the signal's bit order.
         let before = match order {
             Order::Intel => start,
             Order::Motorola => start - start % 8 + (7 - start % 8),

@@ -37,7 +37,7 @@ pub enum Kind {
     Force,
     /// Angle.
     Angle,
-    /// Quaternion component.
+    /// One component of a quaternion.
     Share,
 }
 

@@ -101,7 +101,7 @@ fn frames(ids: &'static [(u16, usize)]) -> impl Strategy<Value = Vec<Vec<u8>>> {
         let (id, bytes) = ids[which];
         frame(id, &data[..if odd == 0 { other } else { bytes }]).to_vec()
     });
-    // Sparse data has many zero bytes, as in real frames, so that states change and quaternions vanish.
+    // Sparse data has many zero bytes, as in real frames, so that validity states change and some quaternions are zero.
     let sparse = (0..ids.len(), any::<[u8; 8]>(), any::<u8>()).prop_map(|(which, data, keep)| {
         let (id, bytes) = ids[which];
         let mut data = data;
@@ -136,7 +136,7 @@ fn same(mapping: &Mapping, set: MessageSet, packets: &[Vec<u8>], heard: &[(u16, 
     if heard.is_empty() {
         assert_eq!(ours.counts(), presets.counts());
     } else {
-        // Frames outside the DBC's mapping aren't checked for length.
+        // The DBC decoder doesn't check the length of frames outside its mapping, so it may count fewer bad frames.
         assert!(ours.counts().bad_frames <= presets.counts().bad_frames);
     }
     readings
@@ -274,8 +274,8 @@ fn vector_in_several_frames_is_reported_when_its_last_frame_arrives() {
     let Reading::SpecificForce(force) = got[0].reading else { panic!() };
     assert!([force.x(), force.y(), force.z()].iter().all(|mps2| (mps2 - 0.5 * 9.806_65).abs() < 1e-3));
     assert_eq!(got[0].valid_at, MonoNs(9_000_000));
-    // After a lost frame, the components that did arrive aren't combined with the next sample. The sample after the gap
-    // is complete.
+    // After a lost frame, the components that have arrived must not be combined with the next sample. The sample after
+    // the gap is complete.
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len()), (0, 0));
     assert_eq!((send(0x80, 10).len(), send(0x70, 1).len(), send(0x576, 1).len()), (0, 0, 1));
     assert_eq!(decoder.withheld(), 0);

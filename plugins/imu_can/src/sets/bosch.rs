@@ -14,9 +14,9 @@ const VERTICAL: u16 = 0x576;
 /// Minimum length of a frame that has both values.
 const NEEDED_BYTES: usize = 6;
 
-/// Step of the turn rates, degrees per second. A count of zero is -163.84.
+/// Step of the turn rates, degrees per second. A raw value of zero means -163.84.
 pub const RATE_QUANTUM_DEGPS: f64 = 0.005;
-/// Step of the accelerations, g. A count of zero is -4.1768.
+/// Step of the accelerations, g. A raw value of zero means -4.1768.
 pub const ACCELERATION_QUANTUM_G: f64 = 0.000_127_465;
 const RATE_OFFSET_DEGPS: f64 = -163.84;
 const ACCELERATION_OFFSET_G: f64 = -4.1768;

@@ -14,7 +14,7 @@ pub struct MessageError {
     pub needed: usize,
 }
 
-/// Converts counts to physical units; `quantum` is the size of one count.
+/// Converts raw values to physical units; `quantum` is the physical value of one raw unit.
 pub fn scaled<const N: usize>(raw: [i16; N], quantum: f64) -> [f64; N] {
     raw.map(|raw| f64::from(raw) * quantum)
 }

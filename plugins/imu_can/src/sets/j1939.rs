@@ -16,11 +16,11 @@ const PRIORITY: u32 = 3;
 /// Source address of encoded frames if the set accepts any sender.
 const ANY_SENDER: u8 = 0x80;
 
-/// Step of the angles, degrees. A count of zero is -250.
+/// Step of the angles, degrees. A raw value of zero means -250.
 pub const SLOPE_QUANTUM_DEG: f64 = 1.0 / 32_768.0;
-/// Step of the turn rates, degrees per second. A count of zero is -250.
+/// Step of the turn rates, degrees per second. A raw value of zero means -250.
 pub const RATE_QUANTUM_DEGPS: f64 = 1.0 / 128.0;
-/// Step of the accelerations, m/s^2. A count of zero is -320.
+/// Step of the accelerations, m/s^2. A raw value of zero means -320.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 0.01;
 const ANGLE_OFFSET_DEG: f64 = -250.0;
 const ACCELERATION_OFFSET_MPS2: f64 = -320.0;

@@ -1,5 +1,5 @@
-//! Makers' message sets. Values are kept as integer counts, as on the wire. Constants beside them state the
-//! size of one count.
+//! Makers' message sets. Values are kept as raw integers, as on the wire. A constant next to each message states the
+//! physical size of one raw unit.
 
 pub mod bosch;
 mod fields;

@@ -8,21 +8,21 @@
 use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Acceleration of one count, m/s^2.
+/// Acceleration that one raw unit stands for, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1e-2;
-/// Turn rate of one count, rad/s.
+/// Turn rate that one raw unit stands for, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1e-3;
-/// Quaternion component of one count.
+/// Size of one raw unit of a quaternion component.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angle of one count, radians. Accuracies of Euler angles have the same count.
+/// Angle that one raw unit stands for, radians. It is the same for Euler angles and for their accuracies.
 pub const EULER_QUANTUM_RAD: f64 = 1e-4;
-/// Temperature difference of one count, degrees Celsius.
+/// Temperature difference that one raw unit stands for, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1e-2;
 
-/// Status bits of valid specific force: the unit responds, and the accelerometers passed their tests and are within
-/// range.
+/// Status bits of valid specific force: the unit responds, and its accelerometers have passed their tests and are
+/// within range.
 const FORCE_WELL: u16 = 0x11D;
-/// Status bits of valid turn rate: the unit responds, and the gyros passed their tests and are within range.
+/// Status bits of valid turn rate: the unit responds, and its gyros have passed their tests and are within range.
 const RATE_WELL: u16 = 0x2E1;
 /// A status with all known bits set to valid.
 pub const ALL_WELL: ImuStatus = ImuStatus(0x3FF);

@@ -7,19 +7,19 @@
 use super::fields::{MessageError, data_id, exactly, words};
 use crate::frame::{CanFrame, CanId, Payload};
 
-/// Quaternion component of one count.
+/// Size of one raw unit of a quaternion component.
 pub const QUATERNION_QUANTUM: f64 = 1.0 / 32_767.0;
-/// Euler angle of one count, degrees.
+/// Angle that one raw unit stands for, degrees.
 pub const EULER_QUANTUM_DEG: f64 = 1.0 / 128.0;
-/// Turn rate of one count, rad/s.
+/// Turn rate that one raw unit stands for, rad/s.
 pub const RATE_QUANTUM_RADPS: f64 = 1.0 / 512.0;
-/// Acceleration of one count, m/s^2.
+/// Acceleration that one raw unit stands for, m/s^2.
 pub const ACCELERATION_QUANTUM_MPS2: f64 = 1.0 / 256.0;
-/// Magnetic field of one count, in units of the earth's field.
+/// Magnetic field that one raw unit stands for, as a fraction of the earth's field.
 pub const MAGNETIC_QUANTUM: f64 = 1.0 / 1024.0;
-/// Temperature difference of one count, degrees Celsius.
+/// Temperature difference that one raw unit stands for, degrees Celsius.
 pub const TEMPERATURE_QUANTUM_DEGC: f64 = 1.0 / 256.0;
-/// Air pressure of one count, Pa.
+/// Air pressure that one raw unit stands for, Pa.
 pub const PRESSURE_QUANTUM_PA: f64 = 1.0 / 32_768.0;
 
 /// CAN identifiers used by the device.
@@ -84,7 +84,7 @@ pub enum Message {
     Temperature(i16),
     /// Air pressure inside the housing.
     BaroPressure(u32),
-    /// Specific force at high rate. Some sources swap this code with the code of [`Message::RateOfTurnHr`].
+    /// Specific force at high rate. Some published sources swap this code with the code of [`Message::RateOfTurnHr`].
     AccelerationHr([i16; 3]),
     /// Turn rate at high rate; see [`Message::AccelerationHr`] about its code.
     RateOfTurnHr([i16; 3]),

@@ -62,7 +62,7 @@ pub(super) fn begin(
     let [i0, i1] = id.to_le_bytes();
     let [b, r] = START;
     frame.clear();
-    // A placeholder for the length, which is set at the end.
+    // The zeros stand for the payload length, which the function `end` sets.
     frame.extend(&[b, r, 0, 0, i0, i1, source, destination])
 }
 

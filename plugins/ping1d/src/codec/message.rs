@@ -72,7 +72,7 @@ record! {
     DistanceSimple {
         /// Distance at the device's speed of sound setting, mm.
         distance_mm: u32,
-        /// Confidence, 0 to 100 %.
+        /// The device's confidence in the distance, 0 to 100 %.
         confidence_percent: u8,
     }
 }
@@ -82,7 +82,7 @@ record! {
     Distance {
         /// Distance at the device's speed of sound setting, mm.
         distance_mm: u32,
-        /// Confidence, 0 to 100 %.
+        /// The device's confidence in the distance, 0 to 100 %.
         confidence_percent: u16,
         /// Pulse length, us.
         pulse_us: u16,
@@ -261,7 +261,7 @@ messages! {
     GeneralRequest(u16) = GENERAL_REQUEST 6,
     /// Sets the device id, for any kind of device.
     SetAnyDeviceId(u8) = SET_ANY_DEVICE_ID 100,
-    /// Sets the echosounder's device id.
+    /// Sets the echosounder's device id, by a message that only echosounders know.
     SetDeviceId(u8) = SET_DEVICE_ID 1000,
     /// Sets the listening range of the device.
     SetRange(ScanRange) = SET_RANGE 1001,
@@ -310,7 +310,7 @@ messages! {
 impl Message {
     /// Decodes a frame. Unknown ids are kept as [`Message::Other`].
     ///
-    /// Errors: the payload doesn't fit the message.
+    /// Errors: the payload's length doesn't fit the message.
     pub fn decode(frame: &Frame<'_>) -> Result<Self, MessageError> {
         let Frame { id, payload, .. } = *frame;
         let length = MessageError::Length { id, len: payload.len() };

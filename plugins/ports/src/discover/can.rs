@@ -1,4 +1,4 @@
-//! Lists CAN interfaces from `/sys/class/net`.
+//! Lists CAN interfaces from `/sys/class/net`, with the problems that prevent their use.
 
 use headrace_sensor::connect::Connect;
 use headrace_sensor::driver::Carrier;

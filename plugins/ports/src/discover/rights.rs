@@ -1,4 +1,4 @@
-//! Access rights of a device file, and the command that grants access.
+//! Access rights of a device file, and the command that grants access to the file.
 
 use std::fs;
 use std::os::unix::fs::MetadataExt as _;
@@ -39,7 +39,7 @@ impl Rights {
             mode
         };
         let group = machine.name_of("/etc/group", file.gid());
-        // The advice must never be to join root's group.
+        // A user must never be advised to join root's group.
         let by_group = mode >> 3 & 0o6 == 0o6 && group.as_deref().is_some_and(|group| group != "root");
         let group = group.unwrap_or_else(|| file.gid().to_string());
         let by_mode = uid == 0 || bits & 0o6 == 0o6;

@@ -14,8 +14,8 @@ const CLASS: &str = "/sys/class/tty";
 const BY_ID: &str = "/dev/serial/by-id";
 /// Port type of a UART that firmware announces but the kernel hasn't detected. Source: Linux, `PORT_UNKNOWN`.
 const NOBODY_THERE: &str = "0";
-/// Number of folders in sysfs searched for the USB device: the tty's own, then port, interface and device
-/// above it.
+/// Largest number of folders in sysfs that are searched for the USB device: the tty's own, then port, interface and
+/// device above it.
 const MOST_UP: usize = 4;
 
 /// USB descriptors of a serial adapter.

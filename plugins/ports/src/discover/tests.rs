@@ -52,7 +52,7 @@ impl Tree {
         fs::set_permissions(self.file(path, ""), fs::Permissions::from_mode(mode)).unwrap();
     }
 
-    /// Adds a USB adapter with one port for each of `ttys`.
+    /// Adds a USB adapter with one serial port for each name in `ttys`.
     fn usb_serial(&self, place: &str, (vendor, product): (&str, &str), serial: Option<&str>, ttys: &[&str]) {
         let device = format!("/sys/devices/usb1/{place}");
         self.file(&format!("{device}/idVendor"), format!("{vendor}\n"));
@@ -168,7 +168,7 @@ fn denied_user_gets_the_command_that_grants_access() {
     let join = "sudo usermod -aG dialout $USER, and log in again";
     for (mode, machine, right) in [
         (0o660, tree.seen_by_stranger(), join),
-        // Ann has joined the group, but her session began before that.
+        // The user Ann has joined the group, but her session began earlier.
         (
             0o660,
             tree.seen_by(4001, &[4001]),

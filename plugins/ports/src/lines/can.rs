@@ -23,7 +23,7 @@ const EXTENDED: u32 = 0x8000_0000;
 
 /// Errors that a CAN socket reports only once: interface down, and interface removed. Source: Linux, errno.
 ///
-/// A socket receives again when its interface comes up. It never receives again after its interface was removed.
+/// A socket receives again when its interface comes up. A socket never receives again after its interface was removed.
 const ENETDOWN: i32 = 100;
 const ENODEV: i32 = 19;
 

@@ -31,7 +31,8 @@ pub trait Line: Send {
     /// Errors: the connection is lost.
     fn read(&mut self, wait: Duration, into: &mut [u8; READ_BYTES]) -> io::Result<Option<(MonoNs, usize)>>;
 
-    /// Reads as [`Line::read`]. On a line to which any machine may send, returns only bytes of the accepted sender.
+    /// Reads as [`Line::read`] does. On a line to which any machine may send, returns only bytes of the accepted
+    /// sender.
     ///
     /// Errors: the connection is lost.
     fn read_device(

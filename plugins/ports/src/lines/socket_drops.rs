@@ -1,7 +1,8 @@
 //! Counts datagrams that the kernel dropped because a socket's queue was full.
 //!
-//! A queue fills while its reader, or the whole computer, stalls. Linux has a count for each socket in
-//! `/proc/net/udp`: the tenth column is the socket's inode, the thirteenth the count. Other systems have no count.
+//! A socket's queue fills while the program that reads it, or the whole computer, stalls. Linux has a count for each
+//! socket in `/proc/net/udp`: the tenth column is the socket's inode, and the thirteenth column is the count. Other
+//! systems have no count.
 
 use std::fs;
 use std::net::UdpSocket;
@@ -14,7 +15,7 @@ const TABLES: [&str; 2] = ["/proc/self/net/udp", "/proc/self/net/udp6"];
 const INODE: usize = 9;
 const DROPS: usize = 12;
 
-/// Counts drops at a socket since the previous query.
+/// Counts the datagrams dropped at a socket since the previous query.
 #[derive(Debug, Default)]
 pub(super) struct SocketDrops {
     reported: u64,
@@ -54,7 +55,7 @@ mod tests {
         let mut drops = SocketDrops::default();
         assert_eq!(drops.new_ones(&socket), 0);
         let to = socket.local_addr().unwrap();
-        // More datagrams than fit into the queue, whatever the kernel's default is.
+        // This number of datagrams doesn't fit into the queue, whatever the kernel's default size is.
         let sent: u64 = 40_000;
         for _ in 0..sent {
             sender.send_to(&[7; 1000], to).unwrap();

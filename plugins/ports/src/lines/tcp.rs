@@ -30,7 +30,7 @@ fn connect(address: &str) -> io::Result<Tcp> {
     for address in address.to_socket_addrs()? {
         match TcpStream::connect_timeout(&address, CONNECT_TIME) {
             Ok(stream) => {
-                // Commands to the device are short, and without TCP_NODELAY the kernel would delay them.
+                // Commands to the device are short. Without TCP_NODELAY, the kernel delays them.
                 stream.set_nodelay(true)?;
                 stream.set_write_timeout(Some(WRITE_TIME))?;
                 return Ok(Tcp { stream, timeout: ReadTimeout::default() });

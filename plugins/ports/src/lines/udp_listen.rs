@@ -1,6 +1,6 @@
 //! UDP from a device that sends to a local port, where any machine may send.
 //!
-//! Only one sender is accepted, by address and port. It is the sender given by `?from=`, or the first one whose
+//! Only one sender is accepted, by address and port. It is the sender given by `?from=`, or the first sender whose
 //! message a driver of the line accepts. Drivers get no data of other senders, and other senders get no commands. A
 //! device that falls silent may return from another port, but not from another address.
 
@@ -26,7 +26,7 @@ struct UdpListen {
     timeout: ReadTimeout,
     drops: SocketDrops,
     from: From,
-    /// The accepted sender, to which commands are sent.
+    /// Sender that was accepted as the device, and to which commands are sent.
     peer: Option<SocketAddr>,
     candidates: VecDeque<Candidate>,
 }

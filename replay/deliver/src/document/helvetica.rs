@@ -3,8 +3,8 @@
 /// Characters with the codes 0x80 to 0x9F in Windows code page 1252, with zeros for the codes that have none.
 const HIGH: &str = "€\0‚ƒ„…†‡ˆ‰Š‹Œ\0Ž\0\0‘’“”•–—˜™š›œ\0žŸ";
 
-/// Widths of the characters 0x20 to 0xFF of Helvetica and of Helvetica-Bold, thousandths of the font size. Source: Adobe Core 14
-/// font metrics, 1997.
+/// Widths of the characters 0x20 to 0xFF of Helvetica and of Helvetica-Bold, in thousandths of the font size. Source:
+/// Adobe Core 14 font metrics, 1997.
 #[rustfmt::skip]
 const WIDTHS: [[u16; 224]; 2] = [
     [

@@ -19,7 +19,7 @@ impl Font {
         width_pt(text, self.size_pt, self.bold)
     }
 
-    /// Breaks a text at its spaces into lines of at most `room_pt`. Words that are longer are divided.
+    /// Breaks a text at its spaces into lines of at most `room_pt`. A longer word is divided.
     pub(super) fn broken(self, text: &str, room_pt: f64) -> Vec<String> {
         let mut lines = vec![String::new()];
         for word in text.split(' ') {
@@ -55,7 +55,7 @@ impl Font {
 /// Widths of a table's columns, which fit into `room_pt`. `fonts` are those of the header and of the cells.
 ///
 /// Columns have the width of their longest cell if all of them fit. Otherwise each column has room for its longest
-/// word, and the rest of the room is divided in proportion to the lengths that don't fit yet.
+/// word, and the rest of the room is divided among the columns, in proportion to the lengths that don't fit yet.
 pub(super) fn column_widths(table: &Table, fonts: [Font; 2], room_pt: f64) -> Vec<f64> {
     let cells = |column: usize| {
         let header = table.columns.get(column).map(|name| (name, fonts[0]));

@@ -1,4 +1,4 @@
-//! A printable document, and its forms as HTML and PDF. Equal documents give equal bytes.
+//! A printable document, which can be written as HTML and as PDF. Equal documents give equal bytes.
 
 mod helvetica;
 mod html;

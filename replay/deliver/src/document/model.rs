@@ -1,4 +1,4 @@
-//! Contents of a document: the same blocks for each form.
+//! Contents of a document. HTML and PDF have the same blocks.
 
 use crate::pictures::shape::Drawing;
 

@@ -30,11 +30,12 @@ const CELL_HEAD: Font = Font { bold: true, ..CELL };
 const FOOTER: Font = Font { size_pt: 8.0, bold: false };
 /// Distance between lines, as a share of the font size.
 const LEADING: f64 = 1.35;
-/// Room below a heading in which the next block must begin.
+/// Smallest room below a heading, in which the next block must begin. With less room, the heading moves to the next
+/// page.
 const KEPT_PT: f64 = 60.0;
 /// Indentation of a list.
 const INDENT_PT: f64 = 12.0;
-/// Largest width of the names beside values.
+/// Largest width of the column of names in a list of values.
 const NAMES_PT: f64 = 150.0;
 const FONTS: [(Name<'static>, Name<'static>); 2] =
     [(Name(b"F0"), Name(b"Helvetica")), (Name(b"F1"), Name(b"Helvetica-Bold"))];
@@ -64,7 +65,7 @@ pub fn pdf(document: &Document) -> Pdf {
     Pdf { bytes: written(pages.done, document), unknown }
 }
 
-/// Lines of a cell, which end at `right_pt`, if it is given.
+/// Lines of a cell. If `right_pt` is given, the lines end there.
 struct Cell {
     left_pt: f64,
     right_pt: Option<f64>,
@@ -246,14 +247,14 @@ fn height_pt(drawing: &Drawing) -> f64 {
     f64::from(drawing.size_px[1]) * scale(drawing)
 }
 
-/// PDF has numbers of single precision.
+/// Converts a number to single precision, as in PDF.
 #[expect(clippy::cast_possible_truncation, reason = "a thousandth of a point is finer than any printer")]
 fn single(value: f64) -> f32 {
-    // Rounded, so that the file isn't full of digits.
+    // The number is rounded, so that the file isn't full of digits.
     ((value * 1000.0).round() / 1000.0) as f32
 }
 
-/// A position from the page's upper left corner, as PDF's position from the lower left corner.
+/// Converts a position from the page's upper left corner to PDF's position from the lower left corner.
 fn page_point([x_pt, y_pt]: [f64; 2]) -> [f32; 2] {
     [single(x_pt), single(PAGE_PT[1] - y_pt)]
 }
@@ -273,7 +274,7 @@ fn colour(Colour(red, green, blue): Colour) -> [f32; 3] {
 fn draw(content: &mut Content, drawing: &Drawing, top_pt: f64) {
     let scale = scale(drawing);
     content.save_state();
-    // From now on positions are those of the drawing, in pixels, except that y grows upwards.
+    // From here on, positions in the PDF are those of the drawing, in pixels, except that y grows upwards.
     let [left, top] = page_point([MARGIN_PT, top_pt]);
     content.transform([single(scale * 1e3) / 1e3, 0.0, 0.0, single(scale * 1e3) / 1e3, left, top]);
     content.set_line_join(LineJoinStyle::RoundJoin);
@@ -358,7 +359,8 @@ fn rectangles(content: &mut Content, areas: &[(Px, Px)]) {
 }
 
 fn circle(content: &mut Content, [x, y]: Px, radius: f64) {
-    /// Distance of the control points of a quarter circle from its ends, as a share of the radius.
+    /// Distance of a quarter circle's control points from its ends, as a share of the radius. PDF draws circles as
+    /// cubic curves.
     const CONTROL: f64 = 0.552_284_75;
     let point = |across: f64, up: f64| [single(x + radius * across), single(radius * up - y)];
     let [from_x, from_y] = point(1.0, 0.0);

@@ -3,7 +3,7 @@
 /// Frame of the positions, as each file states it.
 pub const FRAME: &str =
     "tunnel frame, m: x chainage from the portal, y left, z up from the floor's centre; no EPSG code";
-/// The same frame as well-known text, for formats that have a field for it.
+/// The tunnel frame as well-known text, for file formats that have a field for the frame.
 pub const FRAME_WKT: &str = concat!(
     "LOCAL_CS[\"tunnel frame\",LOCAL_DATUM[\"portal\",32767],UNIT[\"metre\",1],",
     "AXIS[\"chainage\",OTHER],AXIS[\"left\",OTHER],AXIS[\"up\",UP]]"
@@ -37,19 +37,19 @@ pub const UNKNOWN_SD_M: f64 = 1000.0;
 /// A return on the wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Position.
+    /// Position of the return in the tunnel frame.
     pub position_m: [f64; 3],
-    /// Range from the head.
+    /// Range from the head to the return.
     pub range_m: f64,
-    /// Standard deviation of the position, in its least certain direction; [`UNKNOWN_SD_M`] if unknown.
+    /// Standard deviation of the position in the direction in which it is least certain; [`UNKNOWN_SD_M`] if unknown.
     pub position_sd_m: f64,
-    /// Clock position, hours, looking inwards along the tunnel.
+    /// Clock position of the return, hours, looking inwards along the tunnel.
     pub clock_h: f64,
     /// Dive time, s.
     pub time_s: f64,
     /// Number of the head, from zero.
     pub head: u8,
-    /// Whether the return may not be wall.
+    /// Whether the return is doubtful, which means that it may not be wall.
     pub is_doubtful: bool,
 }
 
@@ -58,21 +58,21 @@ pub struct Point {
 pub struct Section {
     /// Chainage as engineers write it, for instance 1+240.50.
     pub station: String,
-    /// Chainage.
+    /// Chainage of the cross-section.
     pub chainage_m: f64,
-    /// Measured outline: y and z, in pieces between gaps.
+    /// Measured outline: y and z, in pieces that end where the wall was not measured.
     pub measured_m: Vec<Vec<[f64; 2]>>,
     /// Design profile: y and z of a closed outline.
     pub design_m: Vec<[f64; 2]>,
-    /// Verdict.
+    /// Verdict of the section, as the report words it.
     pub verdict: String,
-    /// Hole D, if it is known.
+    /// Diameter of the section's hole D, if it is known.
     pub hole_m: Option<f64>,
-    /// Standard deviation of D.
+    /// Standard deviation of the hole diameter D.
     pub hole_sd_m: Option<f64>,
 }
 
-/// Edges of a cross-section; `None` where the wall was not measured.
+/// Floor, crown and walls of a cross-section; `None` where the wall was not measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Edges {
     /// z of the floor's centre.
@@ -90,11 +90,11 @@ pub struct Edges {
 pub struct ProfileStation {
     /// Chainage as engineers write it.
     pub station: String,
-    /// Chainage.
+    /// Chainage of the station.
     pub chainage_m: f64,
-    /// Measured edges.
+    /// Edges (floor, crown and walls) as measured.
     pub measured: Edges,
-    /// Edges of the design.
+    /// Edges (floor, crown and walls) as designed.
     pub design: Edges,
 }
 
@@ -103,13 +103,13 @@ pub struct ProfileStation {
 pub struct TrackPoint {
     /// Dive time, s.
     pub time_s: f64,
-    /// Position.
+    /// Position of the vehicle in the tunnel frame.
     pub position_m: [f64; 3],
     /// Roll, pitch and yaw, degrees.
     pub attitude_deg: [f64; 3],
     /// Standard deviation of the chainage.
     pub chainage_sd_m: Option<f64>,
-    /// Standard deviation of the position in the cross-section, in its less certain direction.
+    /// Standard deviation of the position in the cross-section, in the direction in which it is less certain.
     pub lateral_sd_m: Option<f64>,
     /// Standard deviation of roll or pitch, whichever is larger, degrees.
     pub tilt_sd_deg: Option<f64>,
@@ -124,11 +124,11 @@ pub struct Finding {
     pub stations: [String; 2],
     /// First and last chainage.
     pub chainages_m: [f64; 2],
-    /// Kind, for instance missed or deposit.
+    /// Kind of the finding, for instance missed or deposit.
     pub kind: String,
-    /// Cause, or empty.
+    /// Cause of the finding; empty if there is none.
     pub cause: String,
-    /// Description.
+    /// Description of the finding.
     pub text: String,
 }
 
@@ -136,9 +136,9 @@ pub struct Finding {
 pub struct WallMap<'a> {
     /// Number of pixels along the tunnel and around it.
     pub size: [u32; 2],
-    /// Chainage and arc length of the lower left corner.
+    /// Chainage and arc length of the map's lower left corner.
     pub from_m: [f64; 2],
-    /// Chainage and arc length per pixel.
+    /// Size of a pixel: chainage and arc length.
     pub pixel_m: [f64; 2],
     /// Deviation at a column and row, outwards positive; `None` where the wall was not measured.
     pub deviation_m: &'a dyn Fn(u32, u32) -> Option<f64>,

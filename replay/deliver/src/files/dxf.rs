@@ -1,6 +1,6 @@
 //! Sections and profile as DXF, release 12, which all CAD programs read.
 //!
-//! Release 12 is a text format of few records, so no library writes it. The drawing never lies in memory as a whole.
+//! Release 12 is a text format of few records, so no library writes it. The drawing is never in memory as a whole.
 
 use std::io::{BufWriter, Write};
 
@@ -13,7 +13,7 @@ const DESIGN: &str = "DESIGN";
 const MEASURED: &str = "MEASURED";
 const LABELS: &str = "LABELS";
 const LAYERS: [(&str, u8); 3] = [(DESIGN, 8), (MEASURED, 1), (LABELS, 7)];
-/// Flags of a polyline. Source: DXF reference, release 12, group 70 of POLYLINE and of VERTEX.
+/// Flags of a polyline in DXF. Source: DXF reference, release 12, group 70 of POLYLINE and of VERTEX.
 const CLOSED: u8 = 1;
 const POLYLINE_3D: u8 = 8;
 const VERTEX_3D: u8 = 32;
@@ -22,7 +22,7 @@ const LABEL_M: f64 = 0.25;
 const LABEL_STEP_M: f64 = 10.0;
 /// Columns of a sheet.
 const SHEET_COLUMNS: usize = 10;
-/// Largest coordinate, m. Doubles resolve it far below a millimetre.
+/// Largest coordinate, mm (a million kilometres). A double resolves it far below a millimetre.
 const LARGEST_MM: i64 = 1_000_000_000_000;
 
 /// Drawing that is written entity by entity.
@@ -33,7 +33,8 @@ struct Drawing<W: Write> {
 }
 
 impl<W: Write> Drawing<W> {
-    /// Begins a drawing with its header and layers. `frame` says how the drawing lies in the tunnel frame.
+    /// Begins a drawing with its header and layers. `frame` is a text that states how the drawing is placed in the
+    /// tunnel frame.
     fn new(write: W, what: &'static str, info: &FileInfo, frame: &str) -> Result<Self, FileError> {
         let mut drawing = Self { write: BufWriter::new(write), what, entities: 0 };
         for comment in [&info.title, &info.program, frame] {
@@ -82,7 +83,7 @@ impl<W: Write> Drawing<W> {
         groups.iter().try_for_each(|(code, value)| self.group(*code, value))
     }
 
-    /// Writes a position in mm as three groups. `code` is that of x.
+    /// Writes a position in mm as three groups of DXF. `code` is the group code of x.
     fn place(&mut self, code: u16, position_m: [f64; 3]) -> Result<(), FileError> {
         for (code, value) in [code, code + 10, code + 20].into_iter().zip(position_m) {
             let place = || format!("coordinate of entity {} of {}", self.entities, self.what);
@@ -183,18 +184,18 @@ pub fn write_sheet(write: impl Write, info: &FileInfo, sections: &[Section]) -> 
         sections.iter().flat_map(|section| &section.design_m).chain(measured)
     };
     let largest = |axis: usize| corners().map(|corner| corner[axis].abs()).fold(0.0, f64::max);
-    // A margin for labels between sections.
+    // Space for a section with a margin for its label.
     let [width_m, height_m] = [2.0 * largest(0) + 2.0, largest(1) + 2.0];
     for (number, section) in sections.iter().enumerate() {
         let right_m = (number % SHEET_COLUMNS) as f64 * width_m;
         let down_m = (number / SHEET_COLUMNS) as f64 * height_m;
-        // y points to the left.
+        // The minus is needed because y points to the left.
         draw_section(&mut drawing, section, |[y, z]| [right_m - y, z - down_m, 0.0])?;
     }
     drawing.finish()
 }
 
-/// Draws outlines and label of a section. `to_drawing` places y and z.
+/// Draws outlines and label of a section. `to_drawing` converts y and z to a position in the drawing.
 fn draw_section<W: Write>(
     drawing: &mut Drawing<W>,
     section: &Section,

@@ -36,7 +36,7 @@ fn prototype() -> Vec<Record> {
     records.map(|(name, data_type)| Record { name, data_type }).to_vec()
 }
 
-/// Writes points. Memory does not grow with their number. Returns their number. The stream must be empty.
+/// Writes points, and returns their number. Memory does not grow with this number. The stream must be empty.
 ///
 /// Errors: a value is not finite or too large; the stream fails.
 pub fn write<W: Read + Write + Seek>(

@@ -15,7 +15,7 @@ pub enum FileError {
     Io {
         /// Contents of the file.
         what: &'static str,
-        /// Error of the stream.
+        /// Error that the stream reported.
         source: io::Error,
     },
     /// A value does not fit the format.
@@ -35,7 +35,7 @@ pub enum FileError {
     Encoding {
         /// Contents of the file.
         what: &'static str,
-        /// Reason.
+        /// Reason why the contents can't be encoded.
         text: String,
     },
 }
@@ -58,7 +58,7 @@ impl FileError {
 pub struct PathError {
     /// Path of the file.
     pub path: PathBuf,
-    /// Reason.
+    /// Reason why the file could not be written.
     pub source: FileError,
 }
 

@@ -15,14 +15,16 @@ const BYTE: u32 = 5121;
 const INT: u32 = 5125;
 const CORNERS: u32 = 34962;
 const TRIANGLES: u32 = 34963;
-/// Turns the tunnel frame into glTF's, with y up and right-handed: (x, y, z) becomes (x, z, -y). Column by column.
+/// Matrix that converts the tunnel frame to glTF's frame, which is right-handed with y up: (x, y, z) becomes (x, z,
+/// -y). The matrix is stored column by column.
 const GLTF_FROM_TUNNEL: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
 /// Largest length of a file, which its 32-bit header holds.
 const LARGEST: usize = u32::MAX as usize;
 
 /// Writes the wall. Colours saturate at a deviation of `limit_m`.
 ///
-/// Positions are 32-bit floats, relative to the whole metre of each part's first corner. Parts of up to 2 km keep 0.1 mm.
+/// Positions are 32-bit floats, relative to the whole metre of each part's first corner. In parts of up to 2 km, they
+/// are exact to 0.1 mm.
 ///
 /// Errors: a corner is not finite; a triangle names a corner that doesn't exist; the file exceeds 4 GiB; the stream
 /// fails.
@@ -43,7 +45,7 @@ pub fn write(write: impl Write, info: &FileInfo, parts: &[WallMesh], limit_m: f6
     });
     nodes.push(root);
     if let Some(root) = nodes.last_mut().filter(|_| meshes.is_empty()) {
-        // glTF has no empty lists.
+        // glTF allows no empty lists, so they are left out for a wall without parts.
         *root = json!({"name": info.title, "matrix": GLTF_FROM_TUNNEL});
     } else {
         let surface = json!({"metallicFactor": 0.0, "roughnessFactor": 1.0});
@@ -59,7 +61,7 @@ pub fn write(write: impl Write, info: &FileInfo, parts: &[WallMesh], limit_m: f6
     write_chunks(BufWriter::new(write), &json, layout.length, parts, limit_m)
 }
 
-/// Whole metres of the first corner's chainage.
+/// Chainage of the first corner, rounded to whole metres.
 fn origin_m(part: &WallMesh) -> f64 {
     part.corners_m.first().map_or(0.0, |corner| corner[0].floor())
 }
@@ -91,7 +93,7 @@ fn check(number: usize, part: &WallMesh) -> Result<(), FileError> {
     }
 }
 
-/// Places of the parts in the binary chunk.
+/// Places of the parts in the binary chunk of a GLB file.
 #[derive(Default)]
 struct Layout {
     length: usize,
@@ -100,7 +102,7 @@ struct Layout {
 }
 
 impl Layout {
-    /// Adds a view of `count` items and returns the number of its accessor.
+    /// Adds a buffer view of `count` items, and returns the number of the accessor for it.
     fn view(&mut self, (target, bytes): (u32, usize), mut accessor: Value, count: usize) -> usize {
         self.views.push(json!({
             "buffer": 0, "byteOffset": self.length, "byteLength": bytes, "target": target,

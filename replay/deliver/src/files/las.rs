@@ -18,7 +18,7 @@ const FORMAT: u8 = 6;
 const COMPRESSED: u8 = 0x80;
 /// Flag in the header: the coordinate system is given as well-known text.
 const WKT: u16 = 1 << 4;
-/// Extra values of a point: name, unit, type and scale. Source: table 24.
+/// Values of a point that LAS has no field for: name, unit, type and scale. Source: LAS specification, table 24.
 const EXTRA: [(&str, &str, u8, f64); 5] = [
     ("range_m", "range from the head, m", UNSIGNED_32, 0.001),
     ("position_sd_m", "sd of position, m, 1000: unknown", UNSIGNED_32, 0.001),
@@ -29,9 +29,9 @@ const EXTRA: [(&str, &str, u8, f64); 5] = [
 const UNSIGNED_8: u8 = 1;
 const UNSIGNED_16: u8 = 3;
 const UNSIGNED_32: u8 = 5;
-/// Flag of an extra value: its scale is used.
+/// Flag of an extra value that means that its scale is used.
 const SCALED: u8 = 1 << 3;
-/// Length of a point, and of its extra values, in bytes.
+/// Length of a point's record, and length of its extra values, in bytes.
 const RECORD: usize = 30 + EXTRA_BYTES as usize;
 const EXTRA_BYTES: u16 = 4 + 4 + 2 + 1 + 1;
 
@@ -54,7 +54,7 @@ impl Extent {
     }
 }
 
-/// Writes points, compressed for a LAZ file. Memory does not grow with their number. Returns their number.
+/// Writes points, compressed for a LAZ file, and returns their number. Memory does not grow with this number.
 ///
 /// Errors: a value is not finite or too large; the stream fails.
 pub fn write<W: Write + Seek + Send + Sync>(
@@ -107,7 +107,7 @@ fn record(point: &RoundedPoint) -> [u8; RECORD] {
         at += value.len();
     };
     point.position_mm.iter().for_each(|mm| put(&mm.to_le_bytes()));
-    // Intensity; return 1 of 1; flags; unclassified; user data, angle and point source.
+    // The bytes mean: intensity; return 1 of 1; flags; unclassified; user data, angle and point source.
     put(&[0, 0, 0x11, 0, 1, 0, 0, 0, 0, 0]);
     put(&(point.time_ms as f64 / PER_S).to_le_bytes());
     put(&point.range_mm.to_le_bytes());
@@ -157,10 +157,10 @@ fn variable_records(info: &FileInfo, compression: Option<&LazVlr>) -> std::io::R
     for (name, description, kind, scale) in EXTRA {
         extra.extend([0, 0, kind, if kind == UNSIGNED_8 { 0 } else { SCALED }]);
         extra.extend(field::<32>(name));
-        // Unused, no data, least and largest value.
+        // The zeros stand for unused bytes, the value for no data, and the least and largest value.
         extra.extend([0; 4 + 3 * 24]);
         extra.extend(scale.to_le_bytes());
-        // The rest of the scale, and the offset.
+        // The zeros stand for the rest of the scale, and for the offset.
         extra.extend([0; 16 + 24]);
         extra.extend(field::<32>(description));
     }
@@ -181,7 +181,7 @@ struct Header<'a> {
 }
 
 impl Header<'_> {
-    /// Bytes of the public header block. Source: table 3.
+    /// Bytes of the public header block. Source: LAS specification, table 3.
     fn bytes(&self, extent: &Extent) -> Vec<u8> {
         let (day, year) = self.info.date.map_or((0, 0), |date| (date.day, date.year));
         let points_at = usize::from(HEADER) + self.records.bytes.len();
@@ -196,7 +196,7 @@ impl Header<'_> {
         bytes.extend(self.records.count.to_le_bytes());
         bytes.push(FORMAT | if self.is_compressed { COMPRESSED } else { 0 });
         bytes.extend((30 + EXTRA_BYTES).to_le_bytes());
-        // Counts of earlier versions, which don't have this point format.
+        // The zeros are the numbers of points as in earlier versions, which don't have this point format.
         bytes.extend([0; 6 * 4]);
         bytes.extend(
             [1.0 / PER_M, 1.0 / PER_M, 1.0 / PER_M, 0.0, 0.0, 0.0_f64].iter().flat_map(|v| v.to_le_bytes()),
@@ -205,9 +205,9 @@ impl Header<'_> {
             bytes.extend((f64::from(most) / PER_M).to_le_bytes());
             bytes.extend((f64::from(*least) / PER_M).to_le_bytes());
         }
-        // Neither waveforms nor extended variable length records.
+        // The file has neither waveforms nor extended variable length records.
         bytes.extend([0; 8 + 8 + 4]);
-        // All points, and points by return: all are first returns.
+        // Number of all points, and number of points by return. All of them are first returns.
         bytes.extend(extent.count.to_le_bytes());
         bytes.extend(extent.count.to_le_bytes());
         bytes.extend([0; 14 * 8]);

@@ -1,4 +1,5 @@
-//! Map of the unrolled wall: as a picture (PNG), as data (TIFF), and the world file that places both in the tunnel frame.
+//! Map of the unrolled wall: as a picture (PNG), as data (TIFF), and the world file that states where both are in the
+//! tunnel frame.
 
 use std::io::{BufWriter, Seek, Write};
 
@@ -15,9 +16,9 @@ const DATA: &str = "map as TIFF";
 const WORLD: &str = "world file of the map";
 /// Value of pixels that were not measured.
 pub const NO_DATA: f32 = -9999.0;
-/// Largest deviation in a file, m.
+/// Largest deviation that a file may hold, m.
 const LARGEST_M: f64 = 1000.0;
-/// Axes of a map.
+/// Description of a map's axes, for the file.
 const AXES: &str = "unrolled wall, m: chainage from the portal to the right, arc length from the floor's centre via the left wall \
      upwards; no EPSG code";
 
@@ -50,7 +51,7 @@ impl WallMap<'_> {
     }
 }
 
-/// Writes a world file: size of a pixel and centre of the upper left one.
+/// Writes a world file, which states the size of a pixel and the centre of the upper left pixel.
 ///
 /// Errors: the map is empty; the stream fails.
 pub fn write_world_file(mut write: impl Write, map: &WallMap) -> Result<(), FileError> {
@@ -60,7 +61,8 @@ pub fn write_world_file(mut write: impl Write, map: &WallMap) -> Result<(), File
     write!(write, "{width_m}\n0\n0\n-{height_m}\n{x_m:.6}\n{arc_m:.6}\n").map_err(FileError::io(WORLD))
 }
 
-/// Writes the map as a picture. Its colours saturate at a deviation of `limit_m`. Memory grows with a row only.
+/// Writes the map as a picture. Its colours saturate at a deviation of `limit_m`. Only one row of pixels is in memory
+/// at a time.
 ///
 /// Errors: the map is empty; a deviation is not finite; the stream fails.
 pub fn write_png(write: impl Write, info: &FileInfo, map: &WallMap, limit_m: f64) -> Result<(), FileError> {
@@ -90,19 +92,21 @@ pub fn write_png(write: impl Write, info: &FileInfo, map: &WallMap, limit_m: f64
     writer.finish().map_err(&failed)
 }
 
-/// Writes the map as deviations in m, with [`NO_DATA`] where the wall was not measured. Memory grows with a strip only.
+/// Writes the map as deviations in m, with [`NO_DATA`] where the wall was not measured. Only one strip of pixels is in
+/// memory at a time.
 ///
 /// Errors: the map is empty; a deviation is not finite; the stream fails.
 pub fn write_tiff(write: impl Write + Seek, info: &FileInfo, map: &WallMap) -> Result<(), FileError> {
     map.check(DATA)?;
     let failed = FileError::encoding::<::tiff::TiffError>(DATA);
-    // Not compressed: release 0.11.3 of the crate states a compression of strips, but does not apply it.
+    // The strips are not compressed, because release 0.11.3 of the crate `tiff` states their compression but does not
+    // apply it.
     let mut encoder = TiffEncoder::new(BufWriter::new(write)).map_err(&failed)?;
     let mut image = encoder.new_image::<Gray32Float>(map.size[0], map.size[1]).map_err(&failed)?;
     let ([width_m, height_m], [x_m, arc_m]) = (map.pixel_m, map.upper_left_m());
     let tags = image.encoder();
     let description = format!("{}; deviation from the design, m, outwards positive; {AXES}\0", info.title);
-    // The crate refuses names beyond ASCII as text. Readers take UTF-8.
+    // The text is written as bytes, because the crate refuses text beyond ASCII. Readers accept UTF-8.
     let entry = tags.write_entry_bytes(Type::ASCII, description.as_bytes()).map_err(&failed)?;
     tags.extend_from(&[(Tag::ImageDescription, entry)].into_iter().collect());
     tags.write_tag(Tag::Software, info.program.as_str()).map_err(&failed)?;

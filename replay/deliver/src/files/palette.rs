@@ -7,7 +7,8 @@ const WHITE: f64 = 247.0;
 /// Colour of wall that was not measured.
 pub const NOT_MEASURED: [u8; 3] = [128, 128, 128];
 
-/// Index of the colour of a deviation: 0 where there is none, else 1 (`limit_m` or more inwards) to 255 (outwards).
+/// Index of the colour of a deviation: 0 where there is no deviation, else 1 (`limit_m` or more inwards) to 255
+/// (outwards).
 #[expect(clippy::cast_possible_truncation, reason = "it is within 1 and 255")]
 pub fn index(deviation_m: Option<f64>, limit_m: f64) -> u8 {
     deviation_m.map_or(0, |deviation| (128.0 + 127.0 * (deviation / limit_m).clamp(-1.0, 1.0)).round() as u8)

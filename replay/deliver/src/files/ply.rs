@@ -21,7 +21,7 @@ const PROPERTIES: [(&str, &str); 9] = [
 ];
 /// Length of a point in bytes.
 const RECORD: usize = 3 * 8 + 3 * 4 + 8 + 2;
-/// Digits of the largest number of points.
+/// Number of digits that the header reserves for the number of points.
 const COUNT_DIGITS: usize = 20;
 
 /// Writes points one by one. Memory does not grow with their number.
@@ -76,7 +76,7 @@ impl<'a, W: Write + Seek> PointWriter<'a, W> {
 
 /// Header of a file. Its length does not depend on the number of points.
 fn header(info: &FileInfo, count: u64) -> String {
-    // Some readers take ASCII only.
+    // Other characters are replaced, because some readers accept only ASCII.
     let one_line =
         |text: &str| text.replace(['\n', '\r'], " ").replace(|character| !char::is_ascii(&character), "?");
     let digits = count.to_string();
@@ -86,7 +86,8 @@ fn header(info: &FileInfo, count: u64) -> String {
          element vertex {digits}\n{properties}end_header\n",
         one_line(&info.title),
         one_line(&info.program),
-        // Some readers accept neither leading zeros nor spaces in the count, so a comment is padded.
+        // Some readers accept neither leading zeros nor spaces in the count, so a comment is padded to keep the
+        // header's length.
         " ".repeat(COUNT_DIGITS - digits.len()),
     )
 }

@@ -25,7 +25,7 @@ pub(super) fn steps(
     })
 }
 
-/// Appends a number of `digits` decimals, given in units of its last decimal.
+/// Appends a number with `digits` decimals. `steps` is the number in units of its last decimal.
 pub(super) fn push_decimal(text: &mut Vec<u8>, steps: i64, digits: usize) {
     if steps < 0 {
         text.push(b'-');
@@ -42,7 +42,7 @@ pub(super) fn push_decimal(text: &mut Vec<u8>, steps: i64, digits: usize) {
     }
 }
 
-/// Steps per m, s and hour of a point's values. Ranges of profiling sonars are resolved to 2 mm at best.
+/// Resolution of a point's values: steps per metre, second and hour. Profiling sonars resolve ranges to 2 mm at best.
 pub(super) const PER_M: f64 = 1000.0;
 pub(super) const PER_S: f64 = 1000.0;
 pub(super) const PER_H: f64 = 100.0;
@@ -50,7 +50,8 @@ pub(super) const PER_H: f64 = 100.0;
 /// Largest time that a file holds, ms: a year.
 const LONGEST_MS: i64 = 366 * 86_400_000;
 
-/// A point's values in whole millimetres, milliseconds and hundredths of an hour. All formats write these.
+/// A point's values in whole millimetres, milliseconds and hundredths of an hour. All formats write these rounded
+/// values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RoundedPoint {
     pub(super) position_mm: [i32; 3],
@@ -63,7 +64,7 @@ pub(super) struct RoundedPoint {
 }
 
 impl RoundedPoint {
-    /// Rounds a point. `number` is the number of the point in the file, from zero, for errors.
+    /// Rounds a point. `number` is the index of the point in the file. Errors state it.
     pub(super) fn new(number: u64, point: &Point) -> Result<Self, FileError> {
         let wrong = |name: &str| format!("{name} of point {number}");
         let mut position_mm = [0_i32; 3];
@@ -72,10 +73,10 @@ impl RoundedPoint {
             *slot = narrow(steps(value, PER_M, range, || wrong("position_m"))?);
         }
         let millimetres = |value: f64, name: &str| {
-            // Up to 2^24 a float of 32 bits, which PLY has for it, keeps whole millimetres.
+            // PLY has a 32-bit float for this value. Up to 2^24, such a float holds whole millimetres.
             steps(value, PER_M, [0, 1 << 24], || wrong(name)).map(narrow)
         };
-        // 12 o'clock is 0 h: values that round up to 12 become 0.
+        // 12 o'clock is 0 h, so values that round up to 12 become 0.
         let clock_ch = steps(point.clock_h, PER_H, [0, 1200], || wrong("clock_h"))? % 1200;
         Ok(Self {
             position_mm,
@@ -94,7 +95,7 @@ impl RoundedPoint {
     }
 }
 
-/// Returns a value of a narrower type that holds it, as the caller has checked.
+/// Converts a value to a narrower type. The caller has checked that the type can hold the value.
 fn narrow<T: TryFrom<i64> + Default>(value: i64) -> T {
     T::try_from(value).unwrap_or_default()
 }

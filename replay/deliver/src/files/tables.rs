@@ -6,7 +6,7 @@ use super::data::{Edges, Finding, ProfileStation, Section, TrackPoint};
 use super::error::FileError;
 use super::rounding::{push_decimal, steps};
 
-/// Digits of lengths, angles and times: mm, 0.01 degrees, ms.
+/// Number of decimals of lengths, angles and times, for mm, 0.01 degrees and ms.
 const M: usize = 3;
 const DEG: usize = 2;
 const S: usize = 3;
@@ -14,7 +14,7 @@ const S: usize = 3;
 /// Value of a cell.
 enum Cell<'a> {
     Text(&'a str),
-    /// Number with its digits after the point; empty for `None`.
+    /// A number, and how many digits it has after the point. `None` gives an empty cell.
     Number(Option<f64>, usize),
 }
 
@@ -45,7 +45,7 @@ impl<W: Write> Table<W> {
                 Cell::Number(Some(value), digits) => {
                     let per_unit = [1.0, 10.0, 100.0, 1000.0].get(digits).copied().unwrap_or(1000.0);
                     let place = || format!("{column} in row {} of {}", self.rows + 1, self.what);
-                    // Up to 2^53 doubles hold whole numbers.
+                    // The conversion is exact, because doubles hold whole numbers up to 2^53.
                     push_decimal(
                         &mut self.line,
                         steps(value, per_unit, [-(1 << 53), 1 << 53], place)?,
@@ -67,7 +67,7 @@ impl<W: Write> Table<W> {
     }
 }
 
-/// Text of a cell, in quotes where it needs them.
+/// Text of a cell, in quotes if its characters require them.
 fn quoted(text: &str) -> String {
     if text.contains(['"', ',', '\r', '\n']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -1,4 +1,4 @@
-//! Each file read back: by the reader of another crate where there is one, else by a small one written here.
+//! Each file read back: with the reader of another crate if there is one, or else with a small reader in this file.
 
 #![allow(
     clippy::float_cmp,
@@ -41,7 +41,7 @@ fn stream(points: &[Point]) -> impl Iterator<Item = Result<Point, FileError>> + 
 
 type Points<'a> = &'a mut dyn Iterator<Item = Result<Point, FileError>>;
 
-/// A file in memory of which writes fail beyond a length.
+/// A file in memory. Writes beyond a certain length fail, as on a full disk.
 struct Disk {
     bytes: Cursor<Vec<u8>>,
     size: u64,
@@ -103,7 +103,7 @@ fn encoded(format: &str, points: &[Point]) -> Vec<u8> {
 
 #[test]
 fn las_and_laz_hold_every_value_and_the_bounds() {
-    // More points than a chunk of LAZ, which has 50,000.
+    // These are more points than a chunk of LAZ holds, which has 50,000.
     let points = points(60_001);
     for format in ["LAS", "LAZ"] {
         let mut reader = ::las::Reader::new(Cursor::new(encoded(format, &points))).unwrap();
@@ -151,7 +151,7 @@ fn e57_holds_every_value_and_the_title() {
 #[test]
 fn points_read_from_ply_give_the_same_files_as_the_points_themselves() {
     let mut points = points(3000);
-    // Values between whole millimetres, and a clock position that is rounded up to 12.
+    // The values are between whole millimetres, and a clock position is rounded up to 12.
     for (number, point) in points.iter_mut().enumerate() {
         point.position_m[0] += 0.000_3;
         point.range_m += 0.000_4;

@@ -47,7 +47,7 @@ fn fitting(text: &str, room_px: f64, letters: Letters) -> String {
 }
 
 impl Canvas {
-    /// A white sheet of [`SIZE_PX`] with two title lines; the second is truncated if too long.
+    /// A white sheet of [`SIZE_PX`] with two title lines; the second line is truncated if it is too long.
     pub fn new(title: &str, subtitle: &str) -> Self {
         Self::of_size(SIZE_PX, title, subtitle)
     }

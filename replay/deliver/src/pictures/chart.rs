@@ -6,8 +6,8 @@ use super::canvas::{BOLD, Canvas, Letters, NORMAL, SMALL, Side};
 use super::look::{AXIS, BLACK, Colour, GRID, Look};
 use super::polyline::{Frame, Px};
 
-/// Smallest ratio of an axis's end to its start for logarithmic ticks. With a smaller ratio, the axis gets linear
-/// ticks.
+/// Smallest ratio between the ends of a logarithmic axis at which it has logarithmic ticks. An axis with a smaller
+/// ratio has linear ticks.
 const SHORT: f64 = 4.0;
 /// Length of an axis's tick mark, pixels.
 const TICK_PX: f64 = 4.0;
@@ -72,7 +72,7 @@ impl Axis {
         Self { name_px, ..self }
     }
 
-    /// Removes the axis's name and numbers, for a chart whose neighbour shows the same ones.
+    /// Removes the axis's name and numbers, for a chart beside another chart that already shows them.
     pub fn bare(self) -> Self {
         Self { name: String::new(), numbered: false, ..self }
     }
@@ -157,7 +157,7 @@ pub struct Chart<'c> {
 }
 
 impl<'c> Chart<'c> {
-    /// Draws the chart's grid and both axes.
+    /// Draws the grid and both axes of a chart.
     pub fn new(canvas: &'c Canvas, frame: Frame, x: &Axis, y: &Axis) -> Self {
         let chart = Self { canvas, frame, x: x.scale, y: y.scale };
         let Frame { left, top, right, bottom } = frame;

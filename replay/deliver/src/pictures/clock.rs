@@ -44,8 +44,8 @@ pub fn hours(profile: &Profile) -> Vec<Hour> {
     let hour = |(k, (clock, place)): (u32, (&str, &'static str))| {
         let (sine, cosine) = math::sin_cos(math::TAU * f64::from(k) / 8.0);
         let arc_m = match k {
-            // The first and last positions are both at the seam, where arc length begins again. Rounding could put
-            // either of them at the wrong end of the perimeter.
+            // The first and last positions are both at the seam, where arc length begins again. They are set exactly,
+            // because rounding could put either of them at the wrong end of the perimeter.
             0 => 0.0,
             8 => profile.perimeter_m(),
             _ => profile.arc_of([y_m + sine, z_m - cosine]),

@@ -1,4 +1,5 @@
-//! Colours, and looks of lines and markers. No two looks differ in colour alone.
+//! Colours, and looks of lines and markers. Any two looks differ in more than colour, so that they can be distinguished
+//! in black and white.
 
 /// A colour as red, green and blue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,8 +14,8 @@ pub const PALE: Colour = Colour(150, 150, 150);
 /// Colour of the sheet.
 pub const WHITE: Colour = Colour(255, 255, 255);
 
-/// Colours of the Okabe and Ito palette, which most colour-blind people can distinguish. Those too pale for lines are
-/// left out.
+/// Colours of the Okabe and Ito palette, which most colour-blind people can distinguish. Colours that are too pale for
+/// lines are left out.
 const BLUE: Colour = Colour(0, 114, 178);
 const VERMILION: Colour = Colour(213, 94, 0);
 const GREEN: Colour = Colour(0, 158, 115);
@@ -36,7 +37,7 @@ pub enum Marker {
 }
 
 impl Marker {
-    /// Returns the corners, which lie close to a circle of radius 1.
+    /// Returns the corners of the marker's shape, which lie close to a circle of radius 1.
     pub fn corners(self) -> &'static [[f64; 2]] {
         match self {
             Self::Circle => &[],

@@ -56,7 +56,7 @@ impl Frame {
             }
         }
         let along = |share: f64| [from[0] + share * dx, from[1] + share * dy];
-        // An end that isn't clipped stays bit-identical, so that adjacent pieces can be joined.
+        // An end of the segment that isn't clipped stays bit-identical, so that adjacent pieces can be joined.
         let begin = if first > 0.0 { along(first) } else { from };
         let end = if last < 1.0 { along(last) } else { to };
         (first <= last).then_some([begin, end])

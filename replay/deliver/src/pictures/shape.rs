@@ -35,7 +35,7 @@ pub struct Letters {
 pub struct Drawing {
     /// Width and height, pixels.
     pub size_px: [u32; 2],
-    /// Shapes, of which a later one covers an earlier one.
+    /// Shapes in the order of drawing. A later shape covers an earlier one.
     pub(crate) shapes: Vec<Shape>,
 }
 
@@ -125,7 +125,8 @@ impl Shape {
                     element::Path::new()
                         .set("d", areas.iter().map(area).collect::<String>())
                         .set("fill", hex(*colour))
-                        // Crisp edges turn off anti-aliasing, which would show the sheet between adjacent rectangles.
+                        // Crisp edges turn anti-aliasing off. With anti-aliasing, the sheet would show between adjacent
+                        // rectangles.
                         .set("shape-rendering", "crispEdges"),
                 );
             }

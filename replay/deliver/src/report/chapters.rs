@@ -12,7 +12,7 @@ use crate::document::{Block, Document, Table};
 /// Maximum number of rows in the table of verdicts by chainage.
 const MOST_ROWS: usize = 400;
 
-/// Facts about a dive that its log doesn't contain. Facts that aren't stated are left out of the report.
+/// Facts about a dive that its log doesn't contain. The report leaves out facts that are `None`.
 #[derive(Debug, Clone, Default)]
 pub struct About {
     /// Name of the plant.
@@ -47,7 +47,7 @@ pub struct Delivery<'a> {
     pub report: &'a Report,
     /// The measured wall.
     pub wall: &'a Wall,
-    /// Distance between cross-sections, m; `None` for a distance that suits the extent.
+    /// Distance between cross-sections, m; `None` chooses a distance that suits the length of the inspected tunnel.
     pub every_m: Option<f64>,
     /// Name of the vehicle, from the vehicle file.
     pub vehicle: &'a str,

@@ -1,5 +1,5 @@
-//! Figures of the report. They are legible in black and white: tones differ in lightness, and patterns mark what has no
-//! verdict.
+//! Figures of the report. They are legible in black and white: tones differ in lightness, and patterns mark sections
+//! without a verdict.
 
 use headrace_coverage::Verdict;
 use headrace_geometry::math;
@@ -20,16 +20,16 @@ use crate::pictures::shape::Drawing;
 const WIDTH_PX: u32 = 700;
 /// Left and right ends of the charts over chainage.
 const ENDS_PX: [f64; 2] = [58.0, 614.0];
-/// Length of wall up to which a map has one strip, m.
+/// Largest length of tunnel that a map shows in a single strip, m.
 const STRIP_M: f64 = 80.0;
 const MOST_STRIPS: u32 = 4;
 /// Height of a strip's axis.
 const AXIS_PX: f64 = 50.0;
 /// Height of the legend above the strips.
 const LEGEND_PX: f64 = 34.0;
-/// Least width of a missed section. A narrower one would not be seen.
+/// Least width of a missed section. Nobody would see a narrower one.
 const LEAST_PX: f64 = 1.5;
-/// Least width of a map's cell.
+/// Least width of a map's cell, pixels.
 const CELL_PX: f64 = 2.0;
 /// Least length of a map's cell, m. A cell has at least one section.
 const CELL_M: f64 = 0.5;
@@ -52,12 +52,12 @@ fn tone(section: &SectionRow) -> Tone {
     if section.not_inspected { NOT_SEEN } else { verdict_tone(section.verdict) }
 }
 
-/// Word of the report for a verdict.
+/// Word that the report uses for a verdict.
 pub(super) fn word(verdict: Verdict) -> &'static str {
     if verdict == Verdict::CannotSay { "no verdict" } else { verdict_words(verdict) }
 }
 
-/// Word of the report for a section.
+/// Word that the report uses for a section.
 pub(super) fn section_word(row: &SectionRow) -> &'static str {
     if row.not_inspected { NOT_INSPECTED } else { word(row.verdict) }
 }
@@ -105,7 +105,7 @@ fn strip_count(length_m: f64) -> u32 {
     (1..MOST_STRIPS).find(|count| length_m <= STRIP_M * f64::from(*count)).unwrap_or(MOST_STRIPS)
 }
 
-/// Height of a strip. Fewer strips are higher.
+/// Height of a strip, pixels. If there are fewer strips, each is higher.
 fn strip_px(count: u32) -> f64 {
     90.0 + 140.0 / f64::from(count)
 }
@@ -135,7 +135,7 @@ fn swatch(canvas: &Canvas, upper_left: Px, lower_right: Px, tone: Tone) {
     }
     let ([left, top], [right, bottom]) = (upper_left, lower_right);
     let (frame, height) = (Frame { left, top, right, bottom }, bottom - top);
-    // Lines at multiples of their distance on the sheet, so that they join across neighbouring areas.
+    // The lines are at multiples of their distance on the whole sheet, so that they join across neighbouring areas.
     let step = 6.0;
     let mut x = ((left - height) / step).floor() * step;
     while x < right + height {
@@ -151,7 +151,7 @@ fn swatch(canvas: &Canvas, upper_left: Px, lower_right: Px, tone: Tone) {
     }
 }
 
-/// Chainage against clock position: what passed, was missed, has no verdict, and was not inspected.
+/// Map of chainage and clock position, with the wall that passed, was missed, has no verdict, or was not inspected.
 pub(super) fn inspected(report: &Report, profile: &Profile, extent_m: [f64; 2]) -> Drawing {
     let canvas = strips_canvas(extent_m[1] - extent_m[0]);
     let of = |verdict| (verdict_tone(verdict), word(verdict).to_owned());
@@ -164,7 +164,7 @@ pub(super) fn inspected(report: &Report, profile: &Profile, extent_m: [f64; 2]) 
     strips(&canvas, profile, extent_m, |chart, ends_m| {
         let within = report.sections.iter().filter(|row| row.end_m > ends_m[0] && row.start_m < ends_m[1]);
         let rows: Vec<&SectionRow> = within.collect();
-        // Missed sections are drawn last, since a narrow one is drawn wider than it is.
+        // Missed sections are drawn last, because a narrow one is drawn wider than it is and would be covered.
         for is_missed in [false, true] {
             for run in rows.chunk_by(|a, b| tone(a) == tone(b)) {
                 let (Some(first), Some(last)) = (run.first(), run.last()) else { continue };
@@ -209,7 +209,7 @@ fn holes(chart: &Chart<'_>, report: &Report, [from_m, to_m]: [f64; 2]) {
 /// Draws the outline of a declared opening.
 fn outline(chart: &Chart<'_>, opening: &OpeningReport, perimeter_m: f64) {
     let (from_m, length_m) = opening.arc_from_m.zip(opening.arc_length_m).unwrap_or((0.0, perimeter_m));
-    // The part beyond the perimeter begins again at the floor.
+    // An opening may extend beyond the end of the perimeter. That part of it begins again at the floor.
     for turn in [0.0, perimeter_m] {
         let [low, high] =
             [from_m - turn, from_m + length_m - turn].map(|arc_m| arc_m.clamp(0.0, perimeter_m));
@@ -221,8 +221,8 @@ fn outline(chart: &Chart<'_>, opening: &OpeningReport, perimeter_m: f64) {
     }
 }
 
-/// A map of the wall in classes, whose cells have `sectors` clock sectors. `class` gives the class of a cell with its
-/// area in square metres; a cell without a class stays white.
+/// A map of the wall in which a cell is `sectors` clock sectors wide and the colour of a cell shows its class. `class`
+/// gives the class of a cell with its area in square metres; a cell without a class stays white.
 fn map(
     wall: &Wall,
     extent_m: [f64; 2],
@@ -326,14 +326,14 @@ fn spread_m(wall: &Wall, [from_m, to_m]: [f64; 2]) -> f64 {
     most_m
 }
 
-/// The next 1, 2 or 5 times a power of ten, from 0.01 to 50.
+/// Smallest number that is at least `value` and is 1, 2 or 5 times a power of ten, from 0.01 to 50.
 fn round_up(value: f64) -> f64 {
     let steps =
         [0.01, 0.1, 1.0, 10.0].into_iter().flat_map(|decade| [1.0, 2.0, 5.0].map(|factor| factor * decade));
     steps.into_iter().find(|step| *step >= value).unwrap_or(50.0)
 }
 
-/// Deviation of crown, left and right wall, and floor from the design along the tunnel.
+/// Deviation of crown, left wall, right wall and floor from the design along the tunnel.
 pub(super) fn profile(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
     const PLACES: [(&str, usize); 4] = [("crown", 48), ("left wall", 24), ("right wall", 72), ("floor", 0)];
     const HEIGHT_PX: f64 = 118.0;
@@ -362,7 +362,7 @@ pub(super) fn profile(wall: &Wall, extent_m: [f64; 2]) -> Drawing {
         chart.across(0.0, &TARGET);
         for piece in line.split(|(_, mean_m)| mean_m.is_none()) {
             let points: Vec<_> = piece.iter().map(|(x_m, mean_m)| [*x_m, mean_m.unwrap_or(0.0)]).collect();
-            // A single place between gaps gets a short line, or nobody would see it.
+            // A single place between gaps is drawn as a short line, because nobody would see a point.
             let points = if let [[x_m, m]] = *points {
                 vec![[x_m - step_m / 2.0, m], [x_m + step_m / 2.0, m]]
             } else {
@@ -423,7 +423,7 @@ fn cross_section(canvas: &Canvas, frame: Frame, wall: &Wall, extent_m: [f64; 2])
     let middle = [0, 1].map(|axis| (most(axis, 1.0) - most(axis, -1.0)) / 2.0);
     let scale = f64::min(frame.right - frame.left, frame.bottom - frame.top) / 2.0 / half_m;
     let centre = [f64::midpoint(frame.left, frame.right), f64::midpoint(frame.top, frame.bottom)];
-    // Seen along the tunnel, the left wall (positive y) is on the left.
+    // The section is seen looking along the tunnel, so the left wall (positive y) is on the left.
     let px = |[y, z]: [f64; 2]| [centre[0] - scale * (y - middle[0]), centre[1] - scale * (z - middle[1])];
     let mut grid_m = (middle[0] - half_m).ceil();
     while grid_m <= middle[0] + half_m {

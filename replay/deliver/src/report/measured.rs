@@ -8,7 +8,7 @@ use super::tables;
 use super::wall::Wall;
 use crate::document::Block;
 
-/// Number of cross-sections up to which their distance is chosen.
+/// Largest number of cross-sections if their distance is not given.
 const MOST_SECTIONS: f64 = 24.0;
 /// Distances between cross-sections, m.
 const STEPS_M: [f64; 10] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0];
@@ -70,7 +70,7 @@ fn cross_sections(report: &Report, wall: &Wall, extent_m: [f64; 2], every_m: Opt
     blocks
 }
 
-/// Distance between the cross-sections of an extent, if none is asked for.
+/// Distance between the cross-sections of an extent, if the user gives no distance.
 pub(super) fn usual_step_m(length_m: f64) -> f64 {
     STEPS_M.into_iter().find(|step_m| length_m / step_m <= MOST_SECTIONS).unwrap_or(STEPS_M[9])
 }

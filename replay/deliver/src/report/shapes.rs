@@ -15,7 +15,7 @@ use super::tables::{causes, reason};
 use super::wall::{SECTORS, Wall};
 use crate::files::data::{Edges, Finding, ProfileStation, Section, WallMap, WallMesh};
 
-/// Sectors of the floor, left wall, crown and right wall, and number of sectors that are averaged there.
+/// Clock sectors at the floor, left wall, crown and right wall, and number of sectors that are averaged at each.
 const FLOOR: usize = 0;
 const LEFT: usize = SECTORS / 4;
 const CROWN: usize = SECTORS / 2;
@@ -30,7 +30,7 @@ const MOST_RINGS: usize = 10_000;
 const PART_RINGS: usize = 500;
 
 impl Delivery<'_> {
-    /// Cross-sections, those of the report.
+    /// Cross-sections at the same chainages as in the report.
     pub fn sections(&self) -> Vec<Section> {
         let extent = self.report.coverage_extent;
         let (Some(from_m), Some(to_m)) = (extent.from_m, extent.to_m) else { return Vec::new() };
@@ -101,13 +101,13 @@ impl Delivery<'_> {
         Some(encode(&WallMap { size, from_m, pixel_m, deviation_m: &deviation_m }))
     }
 
-    /// The wall as triangles, in parts. Wall that was not measured lies on the design.
+    /// The wall as triangles, in parts. Triangles of wall that was not measured lie on the design.
     pub fn mesh(&self) -> Vec<WallMesh> {
         let (columns, step_m) = self.columns(MOST_RINGS);
         let from_m = self.report.sections.first().map_or(0.0, |row| row.start_m);
         let part = |begin: usize| {
             let mut part = WallMesh::default();
-            // Neighbouring parts share a ring.
+            // Neighbouring parts share a ring of corners, so that no gap is between them.
             for column in begin..columns.min(begin + PART_RINGS + 1) {
                 let x_m = from_m + column as f64 * step_m;
                 for sector in 0..SECTORS {
@@ -123,7 +123,7 @@ impl Delivery<'_> {
         (0..columns).step_by(PART_RINGS).map(part).collect()
     }
 
-    /// Number and length of columns, each of whole sections, so that there are at most `most`.
+    /// Number of columns, at most `most`, and length of a column. A column consists of whole sections.
     fn columns(&self, most: usize) -> (usize, f64) {
         let sections = self.report.sections.len();
         let each = sections.div_ceil(most).max(1);
@@ -171,7 +171,8 @@ fn wall_point(wall: &Wall, sector: f64, off_m: f64) -> Yz {
     [y + ray[0] * share, z + ray[1] * share]
 }
 
-/// Pieces of an outline around the wall, without its gaps. The last corner is next to the first.
+/// Pieces of an outline around the wall, without its gaps. The outline is closed, so the last corner is next to the
+/// first.
 fn pieces(corners: &[Option<Yz>]) -> Vec<Vec<Yz>> {
     let mut pieces: Vec<Vec<Yz>> =
         corners.split(Option::is_none).map(|piece| piece.iter().flatten().copied().collect()).collect();
@@ -185,7 +186,7 @@ fn pieces(corners: &[Option<Yz>]) -> Vec<Vec<Yz>> {
     pieces
 }
 
-/// Triangles between a ring of a part and the one before it; none for the first ring.
+/// Triangles between a ring of a part and the previous ring; none for the first ring.
 fn band(ring: usize) -> impl Iterator<Item = [u32; 3]> {
     let corner =
         |ring: usize, sector: usize| u32::try_from(SECTORS * ring + sector % SECTORS).unwrap_or(u32::MAX);

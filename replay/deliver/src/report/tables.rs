@@ -26,7 +26,7 @@ fn table<const N: usize>(columns: [&str; N], rows: impl Iterator<Item = [String;
     Table { columns: columns.map(str::to_owned).to_vec(), rows: rows.map(Vec::from).collect() }
 }
 
-/// Length of tunnel by verdict.
+/// Smallest number that is at least `value` and is 1, 2 or 5 times a power of ten, from 0.01 to 50.
 pub(super) fn verdicts(report: &Report) -> Table {
     let sum = &report.summary;
     let rows = [
@@ -45,7 +45,7 @@ pub(super) fn verdicts(report: &Report) -> Table {
     table(["verdict", "length, m", "meaning"], rows.map(row).chain([total]))
 }
 
-/// Missed stretches, with their causes, and whether a later pass has filled them.
+/// Deviation of crown, left wall, right wall and floor from the design along the tunnel.
 pub(super) fn missed(report: &Report) -> Table {
     let row = |run: &RunReport| {
         let refilled = match (run.merged_into, run.cleared_s) {

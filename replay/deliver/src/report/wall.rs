@@ -18,7 +18,7 @@ const PER_HOUR: f64 = 8.0;
 pub(super) struct Cell {
     /// Number of samples.
     pub(super) samples: u32,
-    /// Sum of the samples' deviations from the design, m; positive is outside.
+    /// Sum of the samples' deviations from the design, m; positive if the wall is outside the design.
     sum_m: f32,
 }
 

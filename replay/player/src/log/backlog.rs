@@ -1,4 +1,4 @@
-//! Messages that aren't synced yet: written since the latest sync, or waiting for a medium that accepts data.
+//! Messages that aren't synced yet: written since the latest sync, or still waiting because the medium accepts no data.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -124,7 +124,7 @@ impl Tally {
         self.last = Some(head.log_time);
     }
 
-    /// Returns the numbers of messages so far, in the form of a part's metadata.
+    /// Returns the numbers of messages so far, in the form in which a part's metadata states them.
     pub(super) fn progress(&self, header: &LogHeader) -> Progress {
         let sequences = self.next.iter().filter_map(|(lane, next)| Some((topic(*lane, header)?, *next)));
         Progress { messages: self.messages, tick: self.tick, sequences: sequences.collect() }

@@ -10,7 +10,8 @@ use super::limits::{HeaderBudget, MAX_CHANNELS, MAX_SOURCES};
 use super::loss::Many;
 use super::writer::SourceInfo;
 
-/// Sort rank of the first channel that isn't raw. The rank of a raw channel is its source number, a u16.
+/// Sort rank of the first channel that has no raw bytes of a device. The rank of a raw channel is its source number, a
+/// u16.
 const OTHER_RANK: u32 = 1 << 16;
 
 /// Kind of content that a channel of a log has.
@@ -37,7 +38,7 @@ pub(super) struct Channel {
 /// Result of adding a channel's definition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Admission {
-    /// The channel was added, or was known before with the same definition.
+    /// The channel was added, or it was already known with the same definition.
     Known,
     /// The definition contradicts a known channel.
     Conflict,
@@ -184,7 +185,7 @@ impl Channels {
         results.map(|channel| channel.definition.topic.clone()).collect()
     }
 
-    /// Returns the topics that have several channels, each with its channel numbers.
+    /// Returns the topics that more than one channel has, each with its channel numbers.
     pub(super) fn doubles(&self) -> Vec<(String, Vec<u16>)> {
         let mut topics: BTreeMap<&str, Vec<u16>> = BTreeMap::new();
         for (id, channel) in &self.by_id {

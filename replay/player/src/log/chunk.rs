@@ -46,8 +46,8 @@ pub(super) fn unpack<R: Read + Seek>(
         // Adding a decompressor fails only if the decompressor has no name, and this one has a name.
         tracing::error!(%error, "chunks packed by zstd can't be read");
     }
-    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum then cover
-    // data that is missing.
+    // The header is rebuilt, because the file may end within the chunk. The original lengths and checksum also cover
+    // the data that is then missing.
     let head = chunk_head(place);
     reader.insert(head.len()).copy_from_slice(&head);
     reader.notify_read(head.len());
@@ -70,8 +70,8 @@ pub(super) fn unpack<R: Read + Seek>(
             Unpacked::Bad(LossKind::TooLarge { limit: MAX_UNPACKED_BYTES })
         }
         Err(McapError::UnsupportedCompression(name)) => Unpacked::Bad(LossKind::Compression(name)),
-        // No checksum covers the content. A header that was overwritten with zeros could turn any bytes into an empty
-        // chunk.
+        // Without a checksum, the chunk can't be trusted. A header that was overwritten with zeros could turn any bytes
+        // into an empty chunk.
         _ if place.doubtful && place.crc == 0 => Unpacked::Bad(LossKind::Contents),
         _ if place.cut => Unpacked::Cut,
         Ok(()) => Unpacked::Whole,
@@ -170,7 +170,7 @@ impl Decompressor for Unzstd {
 
     fn decompress(&mut self, src: &[u8], dst: &mut [u8]) -> McapResult<DecompressResult> {
         if self.need == 0 {
-            // There are too few bytes for the magic number, so more are requested.
+            // There are too few bytes to read the magic number, so more bytes are requested.
             let Some(magic) = src.first_chunk() else {
                 return Ok(DecompressResult { consumed: 0, wrote: 0 });
             };

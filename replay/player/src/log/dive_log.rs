@@ -1,8 +1,8 @@
 //! A dive's log: one file, or the parts of a recording read as one log.
 //!
-//! Parts are ordered by the part numbers that they contain, not by file names. Opening scans each part once;
-//! afterwards the parts are read in order. The totals in the header of each part show whether a part is missing or
-//! was replaced.
+//! Parts are ordered by the part numbers that they contain, not by file names. Opening scans each part once; afterwards
+//! the parts are read in order. The totals of earlier parts, which the header of each part has, show whether a part is
+//! missing or was replaced.
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -35,7 +35,7 @@ type Open<R> = Box<dyn FnMut(usize) -> Result<LogReader<R>, LogError> + Send>;
 /// A position in a dive's log, to continue reading from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DivePlace {
-    /// Index of the file in the dive's list of files.
+    /// Index of the file in the dive's list of files from which reading continues.
     at: usize,
     place: LogPlace,
     /// Number of raw messages read from each file.
@@ -57,13 +57,13 @@ pub struct DiveLog<R = File> {
     /// For each source of the file being read, its source number in the dive.
     numbers: Vec<u16>,
     topics: Vec<String>,
-    /// Losses outside the files, such as parts that are missing before, between or after them.
+    /// Losses outside the files, such as parts that are missing before, between or after the files.
     between: Vec<Loss>,
-    /// Losses of the files already read.
+    /// Losses found in the files that have been read to their end.
     earlier: Vec<Loss>,
     late: u64,
     times: Option<(MonoNs, MonoNs)>,
-    /// For each file that was cut off, the continuation in the next file.
+    /// For each file, its continuation in the next file if the file was cut off.
     resumed: Vec<Option<Resumed>>,
     /// Number of messages delivered from the file being read.
     delivered: u64,
@@ -72,7 +72,7 @@ pub struct DiveLog<R = File> {
 /// Continuation of a recording in the next part, after a part was cut off.
 #[derive(Debug, Clone)]
 struct Resumed {
-    /// Totals of the messages before the next part. The next part repeats all messages after these.
+    /// Totals of the messages before the next part. The next part repeats all messages that come after these totals.
     before: Progress,
     /// Number of messages in the cut-off part that the next part doesn't repeat.
     messages: u64,
@@ -129,7 +129,7 @@ impl<R: Read + Seek> DiveLog<R> {
     /// Creates a dive log with a single file, from its reader.
     pub fn of(reader: LogReader<R>) -> Self {
         let file = PartFile { path: PathBuf::new(), messages: 0, number: None };
-        // A single log has no further file to open, so this function is never called.
+        // A single log has no second file to open, so this function is never called.
         let open = |_| Err(LogError::NoLogs { folder: PathBuf::new() });
         Self::start(Box::new(open), reader, vec![file], Vec::new())
     }
@@ -302,7 +302,7 @@ impl<R: Read + Seek> DiveLog<R> {
         }
         (self.earlier, self.late, self.delivered) = (place.earlier.clone(), place.late, place.delivered);
         self.reader.go_to(&place.place)?;
-        // The known sources depend on the position, so they are numbered anew.
+        // The known sources depend on the position in the log, so the sources are numbered again.
         self.number_sources();
         Ok(())
     }
@@ -345,8 +345,8 @@ impl<R: Read + Seek> DiveLog<R> {
     fn in_part(&self, loss: &Loss) -> Option<Loss> {
         let mut loss = loss.clone();
         if let Some(Some(resumed)) = self.resumed.get(self.at) {
-            // The next part repeats all messages that weren't delivered, and states the fault. So this truncation loses
-            // nothing.
+            // The next part repeats all messages that weren't delivered, and states the fault. The truncation therefore
+            // loses nothing.
             if loss.kind == LossKind::Truncated && self.delivered == resumed.messages {
                 return None;
             }
@@ -389,7 +389,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
         match (LogReader::open(path), by_name) {
             (Ok(reader), by_name) => match (&reader.header().part, by_name) {
                 (Some(part), _) => parts.push((path.clone(), Glance::of(&reader, part.head.number))),
-                // The power was cut while this part's header was written. The next part has the same number.
+                // The power was cut while this part's header was written. The next part therefore has the same number.
                 (None, Some(part)) if reader.times().is_none() && !reader.losses().is_empty() => {
                     let why = "it ends within its header".to_owned();
                     losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));
@@ -401,7 +401,7 @@ fn arrange(files: &[PathBuf]) -> Result<Arranged, LogError> {
                 }
                 _ => return Err(LogError::NotAPart { path: path.clone() }),
             },
-            // The file has no MCAP header, like an empty file that was created just before a power cut.
+            // The file has no MCAP header, for instance because it was created just before a power cut and is empty.
             (Err(LogError::NotMcap { name, found, wanted }), Some(part)) => {
                 let why = format!("it begins with [{found}], which no MCAP file does");
                 losses.push(loss(LossKind::PartUnreadable { part, why }, None, None));

@@ -138,7 +138,7 @@ pub enum LogError {
         "the recording wasn't complete {waited_s} s after the dive's end: its medium is too slow or doesn't answer; the log's end may be missing"
     )]
     Stuck {
-        /// Time that the program has waited for the medium, s.
+        /// Time for which the program has waited until the medium accepts data, s.
         waited_s: u64,
     },
     /// The recorder's thread has panicked, which is a bug.

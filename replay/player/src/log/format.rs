@@ -87,7 +87,7 @@ pub struct Tick<'a> {
     "a tick of {packets} packets takes {TICK_HEAD_BYTES} + 2 * {packets} bytes, and the message has {len}"
 )]
 pub struct TickError {
-    /// Packet count stated in the message; 0 if the message is too short to state one.
+    /// Number of packets that the message states; 0 if the message is too short to state one.
     pub packets: u32,
     /// Length of the malformed message, bytes.
     pub len: usize,

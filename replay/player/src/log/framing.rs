@@ -57,7 +57,7 @@ impl<R: Read + Seek> LogFile<R> {
         &self.name
     }
 
-    /// Reads from `at` until `into` is full or the file ends. Returns the number of bytes.
+    /// Reads from `at` until `into` is full or the file ends. Returns the number of bytes that were read.
     ///
     /// Bytes that the medium fails to read become zeros.
     pub(super) fn read_at(&mut self, at: u64, into: &mut [u8]) -> Result<usize, LogError> {
@@ -96,11 +96,12 @@ pub(super) struct Definition {
     pub(super) id: u16,
     pub(super) topic: String,
     pub(super) metadata: BTreeMap<String, String>,
-    /// Schema number and message encoding, for logs of other writers. This program's logs don't need them.
+    /// Schema number and message encoding, which matter only in logs of other programs. This program's logs don't need
+    /// them.
     pub(super) form: Option<(u16, String)>,
 }
 
-/// Compares only the fields that the log's list of channels contains. `form` isn't among them.
+/// Compares only the fields that the log's list of channels contains. The list doesn't have the field `form`.
 impl PartialEq for Definition {
     fn eq(&self, other: &Self) -> bool {
         (self.id, &self.topic, &self.metadata) == (other.id, &other.topic, &other.metadata)
@@ -143,7 +144,7 @@ pub(super) struct ChunkPlace {
     pub(super) times: (u64, u64),
     /// Whether the file ends within the chunk.
     pub(super) cut: bool,
-    /// Whether the chunk's header is damaged, so that its field lengths contradict the record length.
+    /// Whether the chunk's header is damaged, because the lengths of its fields contradict the record length.
     pub(super) doubtful: bool,
 }
 
@@ -230,7 +231,8 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
         return Ok(Found::Nothing);
     }
     let mut glance = [0; GLANCE_BYTES];
-    // A chunk is examined whatever its record length is, because its fields imply the length a second time.
+    // A chunk is examined whatever length its record states, because the fields of a chunk imply its length a second
+    // time.
     let wanted = if opcode == op::CHUNK { u64::MAX } else { len };
     let wanted = usize::try_from(wanted).unwrap_or(usize::MAX).min(GLANCE_BYTES);
     let got = file.read_at(body, glance.get_mut(..wanted).unwrap_or_default())?;
@@ -256,10 +258,10 @@ pub(super) fn look<R: Read + Seek>(file: &mut LogFile<R>, at: u64) -> Result<Fou
     Ok(whole_or_cut(file, frame(end, item, false)))
 }
 
-/// Identifies a record with a damaged opcode by its content.
+/// Identifies a record by its content if its opcode is damaged.
 fn disguised(opcode: u8, body: u64, glance: &[u8], len: u64) -> Option<Item> {
-    // A message may contain any bytes. But bytes that can be parsed as a chunk with matching lengths are no
-    // coincidence.
+    // A message may contain any bytes, so its content proves nothing, unless it can be parsed as a chunk with matching
+    // lengths. That is no coincidence.
     let kinds: &[u8] =
         if opcode == op::MESSAGE { &[op::CHUNK] } else { &[op::CHUNK, op::ATTACHMENT, op::METADATA] };
     kinds
@@ -300,8 +302,8 @@ fn whole_or_cut<R: Read + Seek>(file: &LogFile<R>, frame: Frame) -> Found {
 
 /// Identifies a chunk, which implies its length twice.
 ///
-/// If the two lengths differ, another record begins after the right one. If both lengths are the largest u64, the
-/// writer never closed the chunk.
+/// If the two lengths differ, the right length is the one after which another record begins. If both lengths are the
+/// largest u64, the writer never closed the chunk.
 fn look_at_chunk<R: Read + Seek>(
     file: &mut LogFile<R>,
     mut frame: Frame,

@@ -7,7 +7,7 @@
 
 use headrace_geometry::time::MonoNs;
 
-/// Latest valid timestamp: the year 2262, if time counts from 1970. The sum of a time and a duration then fits into
+/// Latest valid timestamp: the year 2262 if timestamps count from 1970. The sum of a time and a duration then fits into
 /// 64 bits.
 pub(super) const LATEST: MonoNs = MonoNs(i64::MAX as u64);
 /// Maximum length of a record outside chunks, bytes.
@@ -18,11 +18,12 @@ pub(super) const MAX_UNPACKED_BYTES: u64 = 32 << 20;
 pub(super) const RECORD_COST: u64 = 64;
 /// Maximum ratio of unpacked bytes to file bytes, summed over all chunks up to any position in the file.
 ///
-/// Content that repeats every few hundred bytes reaches this ratio. Runs of zeros reach about 30,000.
+/// Content that repeats every few hundred bytes reaches this ratio. Runs of zeros reach a ratio of about 30,000.
 pub(super) const MAX_UNPACKED_RATIO: u64 = 512;
 /// Unpacked bytes that are allowed in addition to the ratio, so that a short log may be highly compressed.
 const UNPACKED_ANYWAY: u64 = 64 << 20;
-/// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. Levels up to 19 use less.
+/// Maximum window of a chunk packed by zstd, as a power of two: 16 MiB. zstd's compression levels up to 19 use smaller
+/// windows.
 pub(super) const MAX_WINDOW_LOG: u32 = 24;
 /// Memory limit for pieces of a log that are in memory at once because their times overlap, bytes. One piece may exceed
 /// it.

@@ -68,7 +68,7 @@ pub enum LossKind {
     },
     /// Messages in a log of this program whose numbers have occurred before.
     Repeated {
-        /// Number of messages that were delivered a second time.
+        /// Number of messages with a number that has occurred before.
         messages: u64,
     },
     /// Messages in a log of this program that come after messages with higher numbers.
@@ -90,8 +90,8 @@ pub enum LossKind {
         /// Number of the channel with two definitions.
         channel: u16,
     },
-    /// All records are readable, but the summary isn't where the footer says. Records are therefore missing, or were
-    /// inserted.
+    /// All records are readable, but the summary isn't at the position that the footer states. Records are therefore
+    /// missing, or were inserted.
     Displaced,
     /// All records are readable, but their common checksum doesn't match. A byte has therefore changed at an unknown
     /// position.
@@ -242,7 +242,7 @@ impl fmt::Display for LossKind {
 }
 
 impl LossKind {
-    /// Writes the text of a loss that concerns a part as a whole.
+    /// Writes the text of a loss that concerns a whole part of a recording.
     fn write_of_part(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PartsMissing { first, last: None } => {

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 /// Length of a disk sector, the smallest unit treated as unreadable, bytes.
 const SECTOR_BYTES: u64 = 512;
-/// Maximum number of unreadable ranges kept. Further ranges are joined to the last one, together with the bytes between
-/// them.
+/// Maximum number of unreadable ranges kept. Each further range is joined to the last kept range, together with the
+/// bytes between the two.
 const MOST_RANGES: usize = 1024;
 
 /// A medium that gives zeros in place of unreadable bytes, and records their ranges. Other bytes may be intact.

@@ -8,7 +8,8 @@ use std::collections::binary_heap::PeekMut;
 
 use super::fields::{Fields, MessageHead};
 
-/// Number of used batches kept for reuse, and maximum memory of each. A chunk of this program's logs fits.
+/// Number of used batches kept for reuse, and maximum memory of each. The messages of a chunk in this program's logs
+/// fit.
 const KEPT: usize = 4;
 const KEPT_BYTES: usize = 3 << 20;
 

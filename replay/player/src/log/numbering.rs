@@ -1,7 +1,7 @@
 //! Finds missing, repeated and reordered messages in this program's logs by their message numbers.
 //!
 //! Each channel counts its messages, and continues the count from part to part. A checksum covers one record, so it
-//! can't show that a whole record was removed, repeated or moved. Message numbers show this.
+//! can't show that a whole record was removed, repeated or moved. The message numbers show such changes.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ struct Run {
 /// Runs of a channel's message numbers read so far.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 struct Count {
-    /// Number that the channel's first message should have.
+    /// Number that the channel's first message in this log should have.
     first: u64,
     runs: Vec<Run>,
 }
@@ -57,8 +57,8 @@ enum Fault {
 struct Break {
     fault: Fault,
     messages: u64,
-    /// First and last piece of a range. The break lies before one of these pieces. An index one above the last piece's
-    /// stands for the log's end.
+    /// First and last piece of a range of pieces. The break lies before one of the pieces in this range. An index one
+    /// above the last piece's stands for the log's end.
     pieces: (usize, usize),
 }
 
@@ -84,7 +84,7 @@ impl Numbering {
         Some(Self { channels, messages: 0, wanted })
     }
 
-    /// Adds the message numbers of a piece of the log, in file order.
+    /// Adds the message numbers of a piece of the log. The entries are in file order.
     pub(super) fn add(&mut self, piece: usize, entries: &[Entry]) {
         for head in entries.iter().map(|entry| entry.head) {
             self.messages += 1;
@@ -130,7 +130,7 @@ impl Numbering {
     }
 }
 
-/// Whether a loss leaves the log's stated number of messages checkable.
+/// Whether the number of messages that the log states can still be checked in spite of a known loss.
 fn is_elsewhere(known: &Loss) -> bool {
     matches!(known.kind, LossKind::Stated(_) | LossKind::Misplaced | LossKind::Truncated)
 }
@@ -154,8 +154,8 @@ impl Break {
         self.fault == other.fault && first <= last
     }
 
-    /// Merges a break in the numbers of another channel into this one, and keeps the pieces common to the two ranges. A
-    /// channel with few messages has a wide range, because few messages locate the break only roughly.
+    /// Merges a break in the numbers of another channel into this break. The result has the pieces that both ranges
+    /// contain. A channel with few messages has a wide range, because few messages locate the break only roughly.
     fn add(&mut self, other: &Self) {
         self.messages += other.messages;
         self.pieces = (self.pieces.0.max(other.pieces.0), self.pieces.1.min(other.pieces.1));
@@ -201,7 +201,7 @@ impl Count {
             return;
         };
         (run.last, run.pieces.1) = (number, piece);
-        // Pieces may be read in an order other than the file's, so this number may close a gap between two runs.
+        // Pieces may be read in an order other than the file's, so the new number may close a gap between two runs.
         let after = self.runs.iter().position(|run| run.first == number + 1 && piece < run.pieces.0);
         let after =
             after.filter(|at| self.runs.get(*at).is_some_and(|run| self.is_clear(piece, run.pieces.0 - 1)));

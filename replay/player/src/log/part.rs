@@ -33,9 +33,9 @@ const DIVE_DIGITS: usize = 16;
 /// Totals of a recording up to a certain point.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Progress {
-    /// Number of messages of all channels up to that point.
+    /// Number of messages of all channels so far.
     pub messages: u64,
-    /// Index of the last tick up to that point; `None` before the first.
+    /// Index of the last tick so far; `None` before the first tick.
     pub tick: Option<u64>,
     /// Number of each topic's next message; empty at the end of a part.
     pub sequences: BTreeMap<String, u32>,

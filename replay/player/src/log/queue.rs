@@ -29,7 +29,7 @@ pub(super) const ENTRY_HEAD_BYTES: usize = 24;
 /// State that both ends of a recorder share, apart from the queue.
 pub(super) struct State {
     pub(super) stopping: AtomicBool,
-    /// Whether the recording ends without an end mark. A later dive can then continue it.
+    /// Whether the recording ends without an end mark. A later dive can then continue the recording.
     pub(super) abandoned: AtomicBool,
     /// Whether the recorder has ended, so that the queue is no longer emptied.
     pub(super) closed: AtomicBool,
@@ -38,21 +38,21 @@ pub(super) struct State {
     /// Ticks that the loop skipped because the recorder was too far behind.
     pub(super) gaps: ArrayQueue<Gap>,
     /// `handed_ns` is the log time of the latest tick that the loop recorded or skipped, ns. `certain_ns` is the log
-    /// time up to which all data is synced or given up, ns. Both are 0 before the first tick.
+    /// time up to which all data is either synced to disk or lost, ns. Both are 0 before the first tick.
     pub(super) handed_ns: AtomicU64,
     pub(super) certain_ns: AtomicU64,
     /// Number of the recorder's steps so far, which distinguishes a stuck recorder from a slow one.
     pub(super) steps: AtomicU64,
     /// Events for people who watch the dive. The oldest are dropped if the queue is full.
     pub(super) events: ArrayQueue<RecordingEvent>,
-    /// Bytes that port threads sent to devices. They don't pass through the loop.
+    /// Bytes that port threads sent to devices. These bytes don't pass through the loop.
     pub(super) sent: ArrayQueue<SentMessage>,
     pub(super) sent_dropped: AtomicU64,
     /// Packets that the connections to devices dropped before the loop could receive them.
     pub(super) dropped: ArrayQueue<Dropped>,
     /// Number of dropped packets that aren't in `dropped`, because that queue was full.
     pub(super) dropped_besides: AtomicU64,
-    /// Recordings of voice notes. They don't pass through the loop.
+    /// Recordings of voice notes. Recordings don't pass through the loop.
     pub(super) voices: ArrayQueue<Vec<u8>>,
     /// Whether the recorder has stopped accepting voice recordings. Set before the recorder looks into `voices` for the
     /// last time.
@@ -63,13 +63,14 @@ pub(super) struct State {
 impl State {
     /// Stores the time of a tick that the loop has recorded or skipped.
     pub(super) fn hand(&self, now: MonoNs) {
-        // Dive time that isn't synced to disk yet is counted from the first tick. Data queued earlier is left out.
+        // Dive time that isn't synced to disk yet is counted from the first tick. Data that was queued before that tick
+        // isn't counted.
         if self.handed_ns.swap(now.0, Ordering::Relaxed) == 0 {
             self.certain_ns.fetch_max(now.0, Ordering::Relaxed);
         }
     }
 
-    /// Returns the time before the latest tick whose data may not be on the disk yet.
+    /// Returns the length of the dive, up to its latest tick, whose data may not be on the disk yet.
     pub(super) fn unsafe_for(&self) -> DurNs {
         let certain = MonoNs(self.certain_ns.load(Ordering::Relaxed));
         DurNs(MonoNs(self.handed_ns.load(Ordering::Relaxed)).since(certain).0.max(0))
@@ -101,7 +102,8 @@ pub(super) struct Dropped {
     pub(super) packets: u64,
 }
 
-/// Records bytes sent to devices, and losses of packets. They don't pass through the loop. Any thread may use it.
+/// Records bytes sent to devices, and losses of packets. Neither passes through the loop. Any thread may use a
+/// `LinePort`.
 #[derive(Clone)]
 pub struct LinePort {
     pub(super) state: Arc<State>,
@@ -181,8 +183,8 @@ impl<R: ByteProducer> Entries<R> {
 
 /// Calls `work` until `is_stopping` returns true and no work is left.
 ///
-/// `work` returns the amount of work that it found, and `idle` waits briefly. `is_stopping` is asked before each call
-/// of `work`, so everything pushed before the stop is processed.
+/// `work` returns the amount of work that it found, and `idle` waits briefly. `is_stopping` is called before each call
+/// of `work`, so all entries that were pushed before the stop are processed.
 pub(super) fn until_stopped(
     is_stopping: impl Fn() -> bool,
     mut work: impl FnMut() -> usize,
@@ -205,7 +207,7 @@ pub(super) struct Queue<R: ByteConsumer = Cons<Arc<HeapRb<u8>>>> {
     pub(super) message: Vec<u8>,
 }
 
-/// Marks the recorder as closed on drop, however the recorder ends, so that the loop doesn't wait for it.
+/// Marks the recorder as closed when it is dropped, so that the loop never waits for a recorder that has ended.
 pub(super) struct ClosedWhenDropped(pub(super) Arc<State>);
 
 impl Drop for ClosedWhenDropped {

@@ -39,8 +39,8 @@ pub struct LogInfo {
     pub metadata: BTreeMap<String, String>,
     /// The sources of the log. A source's index is its number in [`MessageKind`].
     ///
-    /// In this program's logs, the channels' metadata contain the source numbers. If some numbers are missing, the
-    /// sources are numbered by name: `/raw/...` first, then `/sent/...`.
+    /// In this program's logs, the channels' metadata contain the source numbers. If some source numbers are missing,
+    /// the sources are numbered in the order of their names: `/raw/...` first, then `/sent/...`.
     pub sources: Vec<SourceInfo>,
     /// Position of this log in a recording with several parts.
     pub part: Option<Part>,
@@ -92,12 +92,12 @@ pub struct LogMessage<'a> {
 /// A position in a log, from which reading can be resumed.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogPlace {
-    /// Number of the log's pieces (chunks, and runs of messages outside chunks) read so far.
+    /// Number of pieces read so far. A piece is a chunk, or a run of messages outside chunks.
     read: usize,
     /// Pieces of the log from which messages are left: number of the piece, and number of messages taken from
     /// it.
     open: Vec<(usize, usize)>,
-    /// True times of the chunks whose headers state wrong times, each with the piece number of the chunk.
+    /// Times of the messages in those chunks whose headers state wrong times, each with the piece number of the chunk.
     corrected: Vec<(usize, (u64, u64))>,
     latest: u64,
     late: u64,
@@ -127,8 +127,8 @@ pub struct ChannelInfo<'a> {
 /// summary.
 ///
 /// A log with a `/loop/tick` channel is read in file order. Other logs are sorted by log time, source and sequence. A
-/// piece is a chunk, or about a megabyte of messages outside chunks. It is in memory from the time of its earliest
-/// message on, and overlapping pieces are merged.
+/// piece is a chunk, or about a megabyte of messages outside chunks. A piece is in memory from the time of its earliest
+/// message on, and pieces whose times overlap are merged.
 ///
 /// The order is exact if overlapping pieces fit into 32 MiB and chunk headers state correct times.
 /// [`LogReader::late`] counts messages out of order.
@@ -142,8 +142,8 @@ pub struct LogReader<R = File> {
     losses: Losses,
     /// Pieces of the log (chunks, and runs of messages outside chunks), in file order.
     spans: Vec<Span>,
-    /// Times that chunk headers state, if they differ from the times of the messages. The key is the number of the
-    /// piece.
+    /// Times that the headers of chunks state. Only chunks whose messages have other times are listed. The key is the
+    /// number of the piece.
     stated: BTreeMap<usize, (u64, u64)>,
     /// Numbers of the log's pieces, in reading order.
     plan: Vec<u32>,
@@ -257,7 +257,7 @@ impl<R: Read + Seek> LogReader<R> {
         })
     }
 
-    /// Excludes all messages that come after the totals `after`. Call it before reading the first message.
+    /// Excludes all messages that come later than the totals `after`. Call it before reading the first message.
     pub(super) fn pass_over(&mut self, after: &Progress) {
         let number = |topic: &str| after.sequences.get(topic).copied().unwrap_or_default();
         self.repeated = self.channels.all().map(|channel| (channel.id, number(&channel.topic))).collect();
@@ -395,7 +395,7 @@ impl<R: Read + Seek> LogReader<R> {
             self.read_span(*number, *next)?;
         }
         (self.read, self.latest, self.late) = (place.read, place.latest, place.late);
-        // The list ends with the losses known at this position. Later damage is found again when it is read.
+        // The list has only the losses that were known at this position. Later damage is found again when it is read.
         self.losses = Losses::of(place.losses.clone());
         self.numbering.clone_from(&place.numbering);
         self.finished = false;
@@ -462,8 +462,8 @@ impl<R: Read + Seek> LogReader<R> {
             return;
         }
         if self.losses.is_full() {
-            // If the list is full, this loss only extends the last one. The times of the last loss are determined at
-            // the end, because searching for them again and again is slow.
+            // If the list is full, this loss only extends the last entry. The times of the last entry are determined at
+            // the end, because searching for them at each loss is slow.
             let (offset, bytes) = (span.at, span.end.saturating_sub(span.at));
             self.losses.push(Loss { kind, offset, bytes, from: None, to: None });
             return;

@@ -33,22 +33,22 @@ use super::writer::{Lane, LogHeader, Summary};
 const NAP: Duration = Duration::from_millis(2);
 /// Minimum size of the queue: room for the longest packet of a port, and for a tick with many packets.
 const MIN_QUEUE_BYTES: usize = 64 * 1024;
-/// Capacity for messages to devices, enough for some seconds with eight heads.
+/// Capacity for messages to devices, which is enough for some seconds of a dive with eight heads.
 const SENT_MESSAGES: usize = 2048;
 /// Capacity for voice recordings. Each lasts a minute at most, and takes 4 MiB at most.
 const VOICES: usize = 8;
 /// Time to wait at the end for a medium that accepts no data but reports no error.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// Maximum number of waiting events about the recording.
+/// Maximum number of events that wait to be read.
 const EVENTS: usize = 64;
 
 /// Starts recorders on threads of their own.
 pub struct Recorder;
 
-/// The end of a recorder that the loop uses. Its methods don't block, allocate or make system calls.
+/// The end of a recorder's queue that the loop uses. Its methods don't block, allocate or make system calls.
 pub struct RecorderPort {
-    /// An end of the queue that doesn't cache its index, so that the port is `Sync` and can be a resource of the loop's
-    /// world.
+    /// Writing end of the queue. It doesn't cache its index, so that the port is `Sync` and can be a resource of the
+    /// loop.
     entries: Entries,
     state: Arc<State>,
     result_channels: usize,
@@ -58,14 +58,14 @@ pub struct RecorderPort {
 
 /// Handle that ends the recorder.
 ///
-/// If the handle is dropped without [`RecorderHandle::finish`], everything is synced and errors are discarded. The
+/// If the handle is dropped without [`RecorderHandle::finish`], all data is synced, and errors are discarded. The
 /// recording gets no end mark, so it can be continued ([`Recorder::go_on`]).
 pub struct RecorderHandle {
     thread: Option<JoinHandle<Summary>>,
     state: Arc<State>,
     /// Time to wait at the end for a medium that accepts no data but reports no error.
     pub(super) patience: Duration,
-    /// Time at which the end was requested, and whether the total wait is limited.
+    /// Time at which the end of the recording was requested, and whether the total wait is limited.
     ending: Option<(Instant, bool)>,
 }
 
@@ -207,7 +207,7 @@ fn run(mut worker: RecorderWorker) -> Summary {
 }
 
 impl RecorderPort {
-    /// Records bytes from `source`, received at `received` and valid at `valid`.
+    /// Records bytes from `source` that were received at `received` and whose content is valid at `valid`.
     ///
     /// Errors: there is no room; nothing was written.
     pub fn raw(&mut self, source: u16, received: MonoNs, valid: MonoNs, bytes: &[u8]) -> Result<(), Full> {
@@ -302,8 +302,8 @@ impl RecorderPort {
         Ok(())
     }
 
-    /// Ends a series of skipped ticks. If there is no room to record the series, it is recorded together with
-    /// the next one.
+    /// Ends a series of skipped ticks. If there is no room to record the series, it is recorded together with the next
+    /// series.
     fn end_gap(&mut self) {
         if let Some(gap) = self.gap.take() {
             self.gap = self.state.gaps.push(gap).err();
@@ -343,7 +343,7 @@ impl RecorderHandle {
 
     /// Returns the dive time that a power cut would lose now: from the latest synced message to the latest tick.
     ///
-    /// Messages given up after an error count as synced.
+    /// Messages that were lost through an error count as synced.
     pub fn unsafe_for(&self) -> DurNs {
         self.state.unsafe_for()
     }
@@ -397,7 +397,7 @@ impl RecorderHandle {
             if now != steps && !in_time {
                 (steps, since) = (now, Instant::now());
             } else if since.elapsed() > self.patience {
-                // A thread that waits for its medium can't be stopped. It ends together with the program.
+                // A thread that waits for its medium can't be stopped. The thread ends together with the program.
                 return Some(Err(LogError::Stuck { waited_s: self.patience.as_secs() }));
             }
             thread::sleep(NAP);

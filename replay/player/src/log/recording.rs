@@ -3,8 +3,8 @@
 //! If a part can't be written any more, it is left without an end. The recording begins another part, and repeats in it
 //! the messages that may be missing from the previous part.
 //!
-//! After an error, nothing written since the latest sync is reliable, because a file system may discard it and report
-//! success the next time. Messages are therefore kept in memory until they are synced.
+//! After an error, nothing written since the latest sync is reliable, because a file system may discard the data and
+//! still report success for the next sync. Messages are therefore kept in memory until they are synced.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ use super::storage::{Buffered, Storage, Taken};
 use super::unfinished::Interrupted;
 use super::writer::{Lane, LogHeader, LogWriter, PartSummary, Summary};
 
-/// Unsynced bytes after which a sync is due.
+/// Number of unsynced bytes from which on a sync is due.
 const SYNC_BYTES: usize = 4 << 20;
 /// Wait after the first failed retry. The wait doubles after each further failed retry. The first retry is immediate.
 const FIRST_WAIT: Duration = Duration::from_millis(250);
@@ -37,7 +37,7 @@ const NAMES: u32 = 1000;
 struct OpenPart {
     path: PathBuf,
     log: LogWriter<Buffered>,
-    /// Log time of the part's first message, or of the latest failed rotation.
+    /// Log time of the part's first message, or time of the latest attempt to begin another part.
     began: Option<MonoNs>,
     /// File size at which the open part should end, bytes.
     ends_at: u64,
@@ -66,14 +66,14 @@ pub(super) struct Recording {
     storage: Box<dyn Storage>,
     path: PathBuf,
     rotation: Rotation,
-    /// Header of all parts. Its field `part` is set separately for each part.
+    /// Header of all parts. Only the field `part` differs between the parts.
     header: LogHeader,
     open: Option<OpenPart>,
     /// Number of the latest part that has any content.
     number: u32,
     /// Number in the file name of the latest part.
     named: u32,
-    /// Totals of all messages that are synced or lost. The messages after them are in the backlog.
+    /// Totals of all messages that are synced or lost. All later messages are in the backlog.
     settled: Tally,
     backlog: Backlog,
     /// Statements of losses that the log doesn't have on its medium yet.
@@ -153,7 +153,7 @@ impl Recording {
         self.storage.free_bytes(&self.path)
     }
 
-    /// Returns the log time of the latest message that is synced or given up.
+    /// Returns the log time of the latest message that is either synced or lost.
     pub(super) fn certain_to(&self) -> Option<MonoNs> {
         self.settled.last
     }
@@ -168,7 +168,7 @@ impl Recording {
         core::mem::take(&mut self.events)
     }
 
-    /// Sets the time since the recording began. Tries to begin another part if a retry is due.
+    /// Sets the present time, counted from the recording's begin. Tries to begin another part if a retry is due.
     pub(super) fn look(&mut self, now: Duration) {
         self.now = now;
         if self.open.is_none() && self.outage.as_ref().is_some_and(|outage| now >= outage.retry_at) {
@@ -297,8 +297,8 @@ impl Recording {
         self.open = Some(part);
         if let Err(error) = self.write_again(&path) {
             self.fail(&error);
-            // A voice recording is as large as several seconds of a dive. Without voice recordings, the other messages
-            // may fit.
+            // A voice recording is as large as several seconds of a dive. They are dropped because the other messages
+            // may then fit.
             for lost in self.backlog.drop_voices() {
                 self.lose(&lost);
             }
@@ -426,7 +426,7 @@ impl Recording {
         }
     }
 
-    /// Creates the next file. An existing name is skipped; for the first part an existing name is an error.
+    /// Creates the next file. A name that a file already has is skipped. For the first part, such a name is an error.
     fn create(&mut self) -> Result<(PathBuf, Box<dyn super::storage::StoredFile>), LogError> {
         let first = self.named + 1;
         for name in first..first.saturating_add(NAMES) {

@@ -16,7 +16,7 @@ use crate::atomic_file::folder_of;
 /// Condition under which a part of a recording ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Every {
-    /// The file reaches this many bytes. It may exceed this limit by about a second of data.
+    /// The file reaches this many bytes. The file may exceed this limit by about a second of data.
     Bytes(u64),
     /// The messages of the part reach this span of dive time.
     Span(DurNs),
@@ -25,8 +25,8 @@ pub enum Every {
 /// How a recording is split into parts.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Rotation {
-    /// Condition under which a part ends; `None` for a single file. Even then the recording continues in another part
-    /// after an error.
+    /// Condition under which a part ends; `None` for a single file. After an error, the recording continues in another
+    /// part even if `every` is `None`.
     pub every: Option<Every>,
     /// Unique identifier of the recording, see [`super::dive_name`].
     pub dive: String,
@@ -100,8 +100,8 @@ fn continuations(path: &Path) -> Vec<PathBuf> {
         return parts;
     }
     let Some(first) = part_head(path).filter(|head| head.number == 1) else { return Vec::new() };
-    // A part has no header if the power failed while the part was created. Its name shows that it belongs to the
-    // recording.
+    // A part has no header if the power failed while the part was created. Such a part is kept, because its name shows
+    // that it belongs to the recording.
     parts.retain(|part| part_head(part).is_none_or(|head| head.dive == first.dive));
     parts
 }

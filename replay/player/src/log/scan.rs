@@ -94,7 +94,7 @@ pub(super) fn scan<R: Read + Seek>(file: &mut LogFile<R>) -> Result<(Scan, Chann
     let magic_len = mcap::MAGIC.len() as u64;
     let first = file.bytes_at(0, magic_len)?;
     if first != mcap::MAGIC {
-        // If only the first bytes of a log are damaged, its header record still follows them.
+        // If only the first bytes of a log are damaged, the log's header record still follows these bytes.
         if !matches!(look(file, magic_len)?, Found::Record(Frame { item: Item::Header { .. }, .. })) {
             let unread = file.medium().has_failed_within(&(0..magic_len)).then(|| unread(file));
             return Err(unread.unwrap_or_else(|| not_mcap(file, &first)));
@@ -215,8 +215,7 @@ impl Scan {
     ) -> Result<bool, LogError> {
         let before = self.spans.last().filter(|before| before.is_after(&frame.item)).map(|before| before.at);
         let Some(before) = before else { return Ok(false) };
-        // Many chunks may have earlier times than the same chunk. Bytes that were already searched aren't searched
-        // again.
+        // Many chunks may have earlier times than the same chunk. The bytes before such a chunk are searched only once.
         let (start, end) = self.searched;
         let from = if start == before { end } else { before };
         self.searched = (before, frame.at);
@@ -240,8 +239,8 @@ impl Scan {
     }
 
     fn accept<R: Read + Seek>(&mut self, file: &mut LogFile<R>, frame: &Frame) -> Result<(), LogError> {
-        // A footer is the last record of a log. Another record follows here, so the footer is a damaged record of
-        // another kind.
+        // A footer is the last record of a log. Here another record follows the footer, so the footer is really a
+        // damaged record of another kind.
         if let Some((footer, _)) = self.footer.take() {
             self.lose(LossKind::Framing, footer);
         }
@@ -313,8 +312,8 @@ impl Scan {
 
     fn add_chunk(&mut self, at: u64, end: u64, place: &ChunkPlace) {
         let (from, to) = place.times;
-        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks don't
-        // count.
+        // A chunk is counted only if it will be unpacked completely. Chunks over the limit and truncated chunks aren't
+        // counted.
         if !place.compression.is_empty() && !place.cut && place.unpacked_len <= MAX_UNPACKED_BYTES {
             let unpacked = self.unpacked.saturating_add(place.unpacked_len);
             if unpacked > unpacked_limit(end) {
@@ -414,11 +413,11 @@ impl Scan {
         Ok(())
     }
 
-    /// Checks whether whole records are missing. The framing can't show this, because the remaining records still
-    /// adjoin.
+    /// Checks whether whole records are missing. The framing can't show missing records, because the remaining records
+    /// still adjoin.
     ///
-    /// If the end of the file is lost, the closing records are missing. If other records are lost, the summary isn't
-    /// where the footer says.
+    /// If the end of the file is lost, the closing records are missing. If other records are lost, the summary isn't at
+    /// the position that the footer states.
     fn check_closing(&mut self, at: u64) {
         let (Some((_, summary)), Some(data_end)) = (self.footer.take(), self.data_end.clone()) else {
             self.lose(LossKind::Truncated, at..at);
@@ -565,7 +564,7 @@ fn is_believed<R: Read + Seek>(file: &mut LogFile<R>, frame: &Frame, next: &Foun
 }
 
 impl Span {
-    /// Whether an item is a chunk whose first message is earlier than this piece's.
+    /// Whether an item is a chunk whose first message is earlier than the first message of this piece.
     fn is_after(&self, item: &Item) -> bool {
         matches!(item, Item::Chunk(place) if place.times.0 < self.from)
     }

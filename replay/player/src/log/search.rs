@@ -67,8 +67,8 @@ fn find<R: Read + Seek, T>(
     until: u64,
     examine: impl Fn(&mut LogFile<R>, &[u8], u64) -> Result<Option<T>, LogError>,
 ) -> Result<Option<T>, LogError> {
-    // A position is examined with the seven bytes after it. No more are read, because many short ranges may be
-    // searched.
+    // Each position is examined together with the seven bytes after it. No more bytes are read than that, because many
+    // short ranges may be searched.
     let after = mcap::MAGIC.len() - 1;
     let block_bytes = |start: u64| {
         usize::try_from(until - start).map_or(SEARCH_BYTES, |len| SEARCH_BYTES.min(len.saturating_add(after)))
@@ -84,7 +84,7 @@ fn find<R: Read + Seek, T>(
                 return Ok(Some(found));
             }
         }
-        // Windows that cross the end of this block are checked with the next block.
+        // Positions whose eight bytes cross the end of this block are examined with the next block.
         let whole_windows = got.saturating_sub(after);
         if whole_windows == 0 {
             break;

@@ -1,7 +1,8 @@
 //! Monitors the free disk space during a recording, and decides which messages to drop when little space is left.
 //!
 //! Small irreplaceable messages (position readings, ticks, judgements, advice) are recorded until the disk is full.
-//! Echoes are by far the largest share of a log, and are dropped first. The disk then lasts for the whole dive.
+//! Echoes are by far the largest share of a log, and are dropped first. Without echoes, the space lasts for the rest of
+//! the dive.
 //!
 //! The recorder can't decode device data, so it recognises echoes by source and length; the log header lists the
 //! sonars. Heads that send only ranges have short packets, which are kept. A dive with such heads still replays to its
@@ -65,7 +66,8 @@ impl Space {
         }
         self.free = free;
         let free_mb = free / 1_000_000;
-        // Hysteresis: once echoes have been dropped, they are recorded again only with much more free space.
+        // This is a hysteresis: once echoes have been dropped, they are recorded again only when there is much more
+        // free space.
         let sparing = free < SPARE_BELOW_BYTES || (self.sparing && free < WARN_BELOW_BYTES);
         if sparing && !self.sparing {
             tracing::warn!(

@@ -24,7 +24,8 @@ pub trait Storage: Send {
 
 /// A file open for writing. Dropping it writes nothing more.
 pub trait StoredFile: Send {
-    /// Appends as many of `bytes` as possible, from the first on, and returns their number.
+    /// Appends `bytes`, or as many of them from the first on as the medium accepts. Returns the number of bytes
+    /// appended.
     ///
     /// Errors: a system error; after `Interrupted` the caller tries again.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize>;
@@ -44,8 +45,8 @@ pub struct Disk;
 
 impl Storage for Disk {
     fn create(&mut self, path: &Path) -> io::Result<Box<dyn StoredFile>> {
-        // The file is opened in append mode. If another program truncates it, its length stays below the written
-        // length, which shows the fault.
+        // The file is opened in append mode. If another program truncates the file, its length stays below the number
+        // of bytes written, which shows the fault.
         let file = OpenOptions::new().append(true).create_new(true).open(path)?;
         // The lock shows other programs that the file is being written. On file systems without locks, the error is
         // ignored.
@@ -57,7 +58,7 @@ impl Storage for Disk {
             Ok(())
         };
         if let Err(error) = synced {
-            // After an error no new file may be left behind.
+            // After an error, the new file is removed, so that none is left behind.
             self.remove(path).ok();
             return Err(error);
         }
@@ -76,7 +77,8 @@ impl Storage for Disk {
     }
 }
 
-/// Kind of change that another program has made to a recording's file. The content is gone, or is at another path.
+/// Kind of change that another program has made to a recording's file. After it, the file's content is gone or is at
+/// another path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub(super) enum Taken {
     #[error("another program has deleted the file")]
@@ -105,7 +107,8 @@ struct DiskFile {
     /// path.
     known: Option<(u64, u64)>,
     /// Whether the file has been synced once. The first sync doesn't report changes by other programs. If a dive's
-    /// first file disappears while it has only a header, the second sync fails, and the dive continues in another file.
+    /// first file disappears while it has only a header, the second sync therefore fails, and the dive continues in
+    /// another file.
     is_begun: bool,
 }
 

@@ -14,8 +14,8 @@ use super::writer::{Lane, LogHeader, LogWriter, ResultChannel};
 /// Metadata key of a trimmed log. Its value describes the changes.
 pub const TRIMMED: &str = "trimmed";
 
-/// Function that may change a source message. It writes any replacement into the last argument, and returns whether it
-/// has done so. An empty replacement drops the message.
+/// Function that may change a source message. It writes the replacement, if any, into the last argument, and returns
+/// whether there is one. An empty replacement drops the message.
 pub type Change<'a> = &'a mut dyn FnMut(u16, &[u8], &mut Vec<u8>) -> bool;
 
 /// Content that is kept of a log, and changes to this content.
@@ -42,7 +42,8 @@ pub struct Trimmed {
     pub messages: u64,
     /// Number of messages dropped because they are outside the spans.
     pub cut: u64,
-    /// Number of dropped result messages. A trimmed dive has other judgements, and some results name people.
+    /// Number of dropped result messages. They are dropped because a trimmed dive has other judgements, and because
+    /// some results name people.
     pub results: u64,
     /// Number of source messages that were changed.
     pub changed: u64,
@@ -127,7 +128,7 @@ struct Cutter<'a, W: Write> {
     done: Trimmed,
     /// Source numbers of the packets kept since the latest tick, in order.
     order: Vec<u16>,
-    /// Whether all packets since the latest tick were kept.
+    /// Whether all packets since the latest tick were kept, so that the tick is unchanged.
     whole: bool,
     shorter: Vec<u8>,
 }

@@ -69,7 +69,7 @@ impl Interrupted {
 
 impl Unfinished {
     /// Reads the recording named `recording`. Returns `None` if it ended in order, has no data, or is being written.
-    /// Also returns `None` if its logs aren't parts of a recording.
+    /// Also returns `None` if the logs aren't parts of a recording.
     ///
     /// Errors: a log can't be read.
     pub fn read(recording: &Path) -> Result<Option<Self>, LogError> {

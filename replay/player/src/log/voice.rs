@@ -52,8 +52,8 @@ pub struct VoicePort {
 impl VoicePort {
     /// Passes a recording to the log, without blocking.
     ///
-    /// The recording is as safe as sensor data. It is written within a second. If the medium fails, it is written again
-    /// to another part.
+    /// The recording is as safe as sensor data. It is written within a second. If the medium fails, the recording is
+    /// written again to another part.
     ///
     /// Errors: see [`NotKept`]; the recording was not accepted.
     pub fn keep(&self, voice: &Voice) -> Result<(), NotKept> {

@@ -16,7 +16,8 @@ use super::writer::{Lane, LogHeader, Summary};
 
 /// Interval at which a chunk is closed and synced.
 ///
-/// A power cut may lose one second of data. The interval is half a second, because closing and syncing take time too.
+/// A power cut may lose one second of data. The interval is only half a second, because closing and syncing take time
+/// too.
 const FLUSH_PERIOD: Duration = Duration::from_millis(500);
 /// Minimum interval at which the log records how many packets the connections to devices dropped.
 const DROPPED_PERIOD: Duration = Duration::from_secs(5);
@@ -35,7 +36,7 @@ pub struct Made {
     pub bytes: Vec<u8>,
 }
 
-/// Derives messages from results on the recorder's thread, so that the loop has no extra work.
+/// Derives messages from results. This runs on the recorder's thread, so that the loop has no extra work.
 pub trait DerivedChannels: Send {
     /// Processes a message of result channel `channel`. It is called even if the disk has no room for the message
     /// itself.
@@ -50,7 +51,7 @@ pub struct RecorderWorker {
     queue: Queue,
     recording: Recording,
     flushed: Duration,
-    /// Whether anything has been written since the latest flush.
+    /// Whether any data has been written since the latest flush.
     open: bool,
     space: Space,
     echoes: Echoes,
@@ -59,8 +60,8 @@ pub struct RecorderWorker {
     skipped: u64,
     /// Ids of the sources.
     ids: Vec<String>,
-    /// Dropped packets that the log doesn't state yet, by source. The connections to devices dropped them.
-    /// `dropped_stated` is the time of the latest statement in the log.
+    /// Packets that the connections to devices dropped and that the log doesn't state yet, by source. `dropped_stated`
+    /// is the time of the latest statement in the log.
     dropped: BTreeMap<u16, Dropped>,
     dropped_stated: Duration,
     /// Log time of the latest entry. A voice recording has no log time of its own, so it gets this time.
@@ -165,7 +166,8 @@ impl RecorderWorker {
         self.state_gaps();
         self.state_dropped(now, false);
         // After a full batch the recorder is behind, so it doesn't sync yet. The next sync then covers all entries that
-        // arrived meanwhile. Under constant load, the amount of unsynced data triggers a sync.
+        // have arrived meanwhile. If the recorder is behind all the time, the amount of unsynced data still triggers a
+        // sync.
         if !is_behind {
             self.flush_in_time(now);
         }

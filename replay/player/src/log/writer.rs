@@ -115,7 +115,7 @@ pub struct Summary {
     pub faults: Vec<RecordingFault>,
     /// Messages dropped because the disk was nearly full.
     pub left_out: LeftOut,
-    /// Number of messages to devices that didn't fit in the recorder's queue.
+    /// Number of messages sent to devices that were not recorded, because they didn't fit in the recorder's queue.
     pub sent_dropped: u64,
     /// Number of packets in skipped ticks. The recorder was too far behind to record these ticks.
     pub skipped: u64,
@@ -160,7 +160,8 @@ struct Channel {
 /// Chunks are compressed by zstd at its lowest level. A dive produces some hundred kB/s, which even a small computer
 /// compresses a thousand times faster. A smaller file is therefore worth more than the speed of lz4.
 pub struct LogWriter<W: Write> {
-    /// Declared before `writer`, so that it is dropped first. Otherwise the `mcap` crate's writer ends the log on drop.
+    /// The field is declared before `writer`, so that it is dropped first and closes the medium. Otherwise the `mcap`
+    /// crate's writer would end the log when it is dropped.
     medium: Closing,
     writer: mcap::Writer<NoSeek<Counted<W>>>,
     raw: Vec<Channel>,
@@ -203,8 +204,8 @@ impl<W: Write> LogWriter<W> {
         if let Some(result) = header.results.iter().find(|result| !result.topic.starts_with(RESULT_PREFIX)) {
             return Err(LogError::Topic { topic: result.topic.clone() });
         }
-        // Without threads, because the log of a simulation must depend only on its scene and not on the machine.
-        // Without seeking, so that each chunk is written as soon as it is closed.
+        // The writer uses no threads, because the log of a simulation must depend only on its scene and not on the
+        // machine. It doesn't seek, so that each chunk is written as soon as it is closed.
         let options = mcap::WriteOptions::new()
             .profile("headrace")
             .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
@@ -448,10 +449,10 @@ fn write_metadata<W: Write>(
 #[derive(Default)]
 struct Medium {
     bytes: AtomicU64,
-    /// Set to refuse further bytes. This happens after an error, and before the `mcap` crate's writer ends the log on
-    /// drop.
+    /// Whether the medium refuses further bytes. This happens after an error, and before the `mcap` crate's writer ends
+    /// the log on drop.
     shut: AtomicBool,
-    /// Whether a flush must not reach the medium.
+    /// Whether a flush is kept from the medium.
     is_spared: AtomicBool,
 }
 

@@ -1,6 +1,6 @@
 //! Content-defined chunking: cuts bytes into blocks, so that two snapshots share most of their blocks.
 //!
-//! Where a cut is made depends on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX
+//! The place of a cut depends on the surrounding bytes, not on their offset (gear hash: Xia et al., "FastCDC", USENIX
 //! ATC 2016). An insertion therefore changes only the blocks around it.
 
 /// Minimum length of a block, bytes. Only the last block may be shorter.

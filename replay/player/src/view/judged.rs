@@ -26,7 +26,7 @@ pub(super) struct Sections {
     runs: BTreeMap<u64, (i64, i64)>,
     /// Numbers of the missed stretches that have changed, each with its change.
     ///
-    /// The next judgement is of the section that caused the change. It creates the alert to the pilot.
+    /// The next judgement is that of the section that caused the change, and it creates the alert to the pilot.
     changed_runs: Vec<(u64, u64)>,
     shown: Option<MonoNs>,
     changed: bool,

@@ -196,7 +196,7 @@ pub(super) struct Section {
     pub(super) hole_clock: String,
     pub(super) target_m: f64,
     pub(super) flagged: bool,
-    /// Cause of the failure; empty unless the section is flagged or fails.
+    /// Cause for which the section fails; empty unless the section is flagged or fails.
     pub(super) cause: &'static str,
     pub(super) words: String,
 }

@@ -14,8 +14,8 @@
 //! | `advice` | `headrace.Advice` | the advice when it changes, and every second |
 //! | `alerts` | `foxglove.Log` | alerts to the pilot |
 //!
-//! Frame `tunnel` is the one of [`headrace_geometry::frames`]. Its z axis points up, as viewers expect, so nothing
-//! needs rotating. Frame `wall` lies flat beside it: x is chainage, y is arc length.
+//! Frame `tunnel` is the tunnel frame of [`headrace_geometry::frames`]. Its z axis points up, as viewers expect, so
+//! nothing needs rotating. Frame `wall` lies flat beside it: x is chainage, y is arc length.
 //!
 //! The messages are created by the recorder's thread ([`DerivedChannels`]), not by the loop. A replay doesn't read them.
 
@@ -57,7 +57,7 @@ pub use site::Site;
 
 /// Distance between the tunnel and the wall displayed beside it, m.
 const BESIDE_M: f64 = 1.0;
-/// Interval at which unchanged advice is repeated.
+/// Interval at which advice is published again if it hasn't changed.
 const ADVICE_EVERY: DurNs = DurNs(1_000_000_000);
 /// Speeds that differ by less than this count as equal advice, m/s.
 const SAME_MPS: f64 = 0.005;
@@ -122,8 +122,8 @@ impl View {
             }
             RecordKind::Alert => self.observation(&mut words, made),
             RecordKind::Advice => self.advice(&mut words, made),
-            // Viewers get only samples. Doubtful returns, live states and the list of alerts are only in the log's
-            // results.
+            // Viewers get only samples. Doubtful returns, live states and the list of alerts are not for viewers: they
+            // are only in the log's results.
             RecordKind::NoSample
             | RecordKind::Doubtful
             | RecordKind::State

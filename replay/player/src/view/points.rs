@@ -30,15 +30,15 @@ const FARTHEST_M: f64 = 128.0;
 #[derive(Debug, Default)]
 pub(super) struct Points {
     began: Option<MonoNs>,
-    /// Chainage of the cloud's origin, m. Points are relative to the origin, because a float is too coarse for seven
-    /// kilometres.
+    /// Chainage of the cloud's origin, m. Points are relative to the origin, because a 32-bit float is too coarse for
+    /// chainages of several kilometres.
     origin_m: f64,
     data: Vec<u8>,
 }
 
 impl Points {
-    /// Adds a sample of a head, received at `at`. If the current cloud was full, or too old for the sample, returns
-    /// that cloud and begins another.
+    /// Adds a sample of a head, received at `at`. If the current cloud is full, or too old for the sample, first
+    /// returns that cloud and begins another.
     pub(super) fn add(&mut self, at: MonoNs, head: u8, [x_m, y_m, z_m]: [f64; 3]) -> Option<PointCloud> {
         let full = if self.data.len() >= MOST_POINTS * STRIDE { self.close() } else { self.close_before(at) };
         if self.began.is_none() {

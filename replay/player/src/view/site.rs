@@ -1,4 +1,4 @@
-//! The site that a view displays, and the names of its frames.
+//! Properties of the site that a view displays, and the names of the view's frames.
 
 use headrace_geometry::tunnel::Profile;
 use headrace_monitor::head_descriptions::HeadDescriptions;

@@ -23,7 +23,7 @@ fn record(kind: RecordKind, words: &[u64]) -> Vec<u64> {
     [&[(words.len() as u64) << 8 | kind as u64], words].concat()
 }
 
-/// Returns the messages that the view creates from records of a stream, by topic.
+/// Returns the messages, by topic, that the view creates from records of a stream.
 fn taken(view: &mut View, stream: &str, at: u64, records: &[Vec<u64>]) -> BTreeMap<String, Vec<Value>> {
     let words = [&[0, 0], records.concat().as_slice()].concat();
     let message: Vec<u8> = words.into_iter().flat_map(u64::to_le_bytes).collect();

@@ -26,7 +26,7 @@ const FIELDS: [Field; 6] = [
     Field::byte("samples", 4),
     Field::byte("verdict", 5),
 ];
-/// Maximum sample count of a cell. Exact counts take up most of the message's length.
+/// Maximum number of samples that is counted in a cell. Exact counts would take up most of the message's length.
 const MOST_SAMPLES: u8 = 3;
 
 /// Samples and verdicts of the wall's cells. Columns are allocated only where the vehicle has passed.

@@ -1,4 +1,4 @@
-//! Treats a beam as a cone. The range is formed from all the wall within the cone.
+//! Treats a beam as a cone. The range is computed from all the wall within the cone.
 
 use bevy_ecs::prelude::{Component, Query, Res};
 use headrace_config::{ConfigError, Section};
@@ -16,7 +16,7 @@ use crate::facts::{Facts, SensorFacts};
 use crate::sensing::{Ray, Rays, Reach, Samples, Scenery};
 use crate::stages::{OwnBeam, Stage};
 
-/// A beam is a cone, and its range is formed from all the wall within it.
+/// A beam is a cone, and the range is computed from all the wall within the cone.
 ///
 /// The range is that of the nearest point, the mean, or the surface by the interpolation of Jorge et al. 2021.
 ///
@@ -35,8 +35,8 @@ pub(super) struct BeamConeKind;
 /// Angle between successive rays of a sunflower pattern, radians: the golden angle. Source: Vogel, "A better way to
 /// construct the sunflower head", Mathematical Biosciences 44, 1979.
 const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
-/// Strength at the beam's edge relative to the axis. The edge is at half power, since beam widths are measured between
-/// half-power points.
+/// Strength at the beam's edge relative to the axis. The edge is at half power, because beam widths are measured
+/// between half-power points.
 const EDGE: f64 = 0.5;
 /// Full width of an echosounder's beam, degrees.
 const ECHOSOUNDER_DEG: f64 = 30.0;

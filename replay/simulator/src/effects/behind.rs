@@ -14,8 +14,8 @@ pub(super) struct Behind {
 impl Behind {
     /// Applies the head's offset to a ping.
     ///
-    /// `made` is false if the head missed the step to this ping. `is_reported` is true if the head reports its true angle,
-    /// which includes the offset.
+    /// `made` is false if the head missed the step to this ping. `is_reported` is true if the head reports its true
+    /// angle, including the offset.
     pub(super) fn step(&mut self, sounding: &mut Sounding, made: bool, is_reported: bool) {
         let commanded_rad = sounding.angle_rad;
         let step_rad =

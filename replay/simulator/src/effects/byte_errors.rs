@@ -30,8 +30,8 @@ struct Parameters {
     inserted: f64,
 }
 
-/// Selects the affected bytes. All bytes have the same probability. A single random number therefore tells how many
-/// bytes pass until the next affected byte.
+/// Selects the affected bytes. All bytes have the same probability. A single random number therefore determines how
+/// many bytes pass until the next affected byte.
 struct Hits {
     stream: Stream,
     kind: u64,
@@ -134,8 +134,8 @@ impl ByteErrors {
         }
     }
 
-    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes, because the outbox
-    /// drops empty messages later.
+    /// Damages the messages on the line. A message keeps its index even if it loses all its bytes, because the outbox,
+    /// which sends the messages, drops empty ones later.
     fn damage(&mut self, line: &mut Line) {
         let mut rest = std::mem::take(&mut self.rest);
         rest.clear();

@@ -27,8 +27,8 @@ const LOOK_S: f64 = 5.0;
 ///
 /// `speed_mps`, positive towards growing chainage, applies from `from_m` to `to_m`. Several tables define several
 /// stretches, as on both sides of a leak. `gust_sd_mps`, in a table for the whole tunnel, adds a Gauss-Markov variation
-/// whose correlation falls to 1/e within `gust_s` (60 by default). The pilot doesn't correct the displacement by gusts.
-/// A trajectory given over ground is independent of currents, so combining the two is refused.
+/// whose correlation falls to 1/e within `gust_s` (60 by default). The pilot doesn't correct the displacement that
+/// gusts cause. A trajectory given over ground is independent of currents, so combining the two is refused.
 ///
 /// Source: Jorge et al. 2021, §9.1 (0.10 m/s through a leak, against the vehicle or with it).
 pub(super) struct CurrentKind;
@@ -187,12 +187,13 @@ mod tests {
             ways += way_m * way_m / f64::from(runs);
         }
         let sd_mps = math::sqrt(speeds / count);
-        // The spline slightly smooths the fastest changes, so the standard deviation is a little below 0.05.
+        // The spline through the displacements slightly smooths the fastest changes, so the standard deviation is a
+        // little below 0.05.
         assert!((0.046..0.051).contains(&sd_mps), "{sd_mps}");
         let correlation = lagged / speeds;
         assert!((correlation - math::exp(-1.0)).abs() < 0.04, "{correlation}");
-        // Each random speed lasts for one step. The expected variance is therefore that of a sum of discrete steps, not
-        // of an integral.
+        // Each random speed lasts for one step. The expected variance is therefore the variance of a sum of discrete
+        // steps, not of an integral.
         let kept = math::exp(-1.0 / STEPS);
         let wanted = 0.05 * 0.05 * seconds * (20.0 / STEPS) * (1.0 + kept) / (1.0 - kept);
         assert!((ways / wanted - 1.0).abs() < 5.0 * math::sqrt(2.0 / f64::from(runs)), "{ways} {wanted}");

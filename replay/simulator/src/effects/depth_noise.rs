@@ -41,7 +41,7 @@ struct DepthNoise {
     parameters: Parameters,
     stream: Stream,
     offset_pa: f64,
-    /// Latest value of the drift, in standard deviations. The next field is the time at which the drift had this value.
+    /// Latest value of the drift, in standard deviations. The field after it has the time of this value.
     drift: f64,
     before: Option<MonoNs>,
 }
@@ -125,8 +125,8 @@ mod tests {
         assert!(lagged.abs() < 5.0 * 9e4 / math::sqrt(n), "{lagged}");
     }
 
-    /// Over a lag t, a Gauss-Markov process with correlation time tau changes by a mean square of 2 sd^2 (1 - exp(-t /
-    /// tau)).
+    /// Within a time t, a Gauss-Markov process with correlation time tau changes, and the mean square of the change is
+    /// 2 sd^2 (1 - exp(-t / tau)).
     #[test]
     fn depth_drift_changes_at_the_given_rate() {
         let parameters = Parameters { noise_pa: 0.0, offset_sd_pa: 0.0, drift_pa: 100.0, tau_s: 20.0 };
@@ -144,7 +144,7 @@ mod tests {
         }
     }
 
-    /// In these samples, the changes of the drift must be independent of the noise.
+    /// Checks that the changes of the drift are independent of the noise.
     #[test]
     fn depth_noise_and_drift_are_independent() {
         let stream = Stream::new(3, "depth_noise", "depth");

@@ -30,7 +30,7 @@ use crate::stages::Stage;
 ///   echosounder's range and the cable length, degrees for a head's angle and an inertial unit's heading, metres of
 ///   water for a depth, and m/s along the sensor's x for a velocity.
 /// - `die`: the device sends nothing.
-/// - `babble`: the device sends as many bytes as without the fault, but random ones.
+/// - `babble`: the device sends random bytes, as many as it would send without the fault.
 pub(super) struct DeviceFaultsKind;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -213,7 +213,7 @@ fn jump_soundings(mut sonars: Query<'_, '_, (&mut Samples<Sounding>, &Jumped, Op
     for (mut samples, Jumped { size, span }, echosounder) in &mut sonars {
         for sounding in samples.list.iter_mut().filter(|sounding| span.holds(sounding.at)) {
             if echosounder.is_some() {
-                // An added negative error must not make a range negative.
+                // A range must not become negative, even if the added error is negative.
                 sounding.range_m = sounding.range_m.map(|range_m| (range_m + size).max(0.0));
             } else {
                 sounding.reported_rad += size.to_radians();
@@ -283,7 +283,7 @@ impl BrokenLine {
         for message in received.filter(|message| self.span.holds(message.at)) {
             let (from, to) = message.bytes;
             let Some(stream) = self.stream else {
-                // Messages without bytes keep their indices, and the outbox drops them.
+                // Messages without bytes keep their indices. The outbox, which sends the messages, drops them.
                 message.bytes = (from, from);
                 continue;
             };

@@ -124,7 +124,7 @@ type Detecting<'a> = (&'a mut Samples<Sounding>, &'a Rays, &'a EchoStrength, Opt
 fn detect(scenery: Res<'_, Scenery>, mut heads: Query<'_, '_, Detecting<'_>>) {
     for (mut samples, rays, echoes, stopped) in &mut heads {
         for (number, ((step, sounding), ray)) in samples.steps().zip(&rays.0).enumerate() {
-            // Echoes of the vehicle's own parts are always strong enough, so they are skipped.
+            // Echoes of the vehicle's own parts are always strong enough, so this system skips them.
             let Some(hit) = ray.hit.filter(|_| !Stopped::has(stopped, number)) else { continue };
             let Some(sonar) = echoes.places.here(&scenery, ray) else { continue };
             let [chance, _] = echoes.stream.at(step).uniform();

@@ -3,7 +3,8 @@
 use headrace_geometry::frames::{Tunnel, Vec3};
 use headrace_geometry::math;
 
-/// A beam counts as parallel to the tunnel if its direction has a larger component along the tunnel than this.
+/// A beam counts as parallel to the tunnel if the component of its direction along the tunnel is larger than this
+/// value.
 const ALONG: f64 = 0.9;
 
 /// Scalar product of two vectors.

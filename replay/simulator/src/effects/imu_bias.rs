@@ -33,9 +33,9 @@ const TILT: u64 = 3;
 ///   dive.
 /// - `attitude_drift_deg_per_hour` turns the unit's own attitude about the vertical at a constant rate, positive to the
 ///   left.
-/// - `tilt_deg` is the standard deviation of a similar process that tilts the attitude, with time constant `tilt_tau_s`
-///   (30 by default). Apart from this, the influence of biases and accelerations on the unit's own filter isn't
-///   simulated.
+/// - `tilt_deg` is the standard deviation of another Gauss-Markov process, which tilts the attitude, with time constant
+///   `tilt_tau_s` (30 by default). Apart from this, the influence of biases and accelerations on the unit's own filter
+///   isn't simulated.
 ///
 /// All are zero by default. Source: Brown and Hwang, Introduction to Random Signals and Applied Kalman Filtering, 4th
 /// ed., §4.4 (exact steps).
@@ -63,8 +63,8 @@ struct ImuBias {
     /// Latest tilt of the attitude in roll and pitch, in standard deviations.
     tilt: [f64; 2],
     before: Option<MonoNs>,
-    /// Previous sample interval, with two factors for the biases and the same two for the tilt. The factors are the
-    /// correlation over the interval and the weight of a new random number.
+    /// Previous sample interval, with two factors for the biases and two for the tilt. The factors are the correlation
+    /// over the interval and the weight of a new random number.
     ///
     /// The factors are kept because most samples have the same interval.
     kept: (DurNs, [[f64; 2]; 2]),
@@ -225,7 +225,7 @@ mod tests {
         [a, b, c, d, e, f]
     }
 
-    /// Over many seeds, the variance at the first sample and at a much later one equals the given one, and the
+    /// Over many seeds, the variance at the first sample and at a much later sample equals the given variance, and the
     /// correlation between the two samples is exp(-t / tau).
     #[test]
     fn biases_are_stationary_and_decorrelate_over_tau() {

@@ -18,7 +18,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// Length of the time spans into which a dive is divided, s. Each contains at most one bump.
+/// Length of the time spans into which a dive is divided, s. Each span contains at most one bump.
 const SPAN_S: f64 = 1.0;
 
 /// From time to time the vehicle bumps into the wall, a rock or its own cable. It is pushed one way and swings back.
@@ -134,8 +134,8 @@ mod tests {
 
     const KEYS: &str = "[effects.imu_bumps]\nper_hour = 400\nspeed_mps = [0.05, 0.2]\nseconds = 0.3\n";
 
-    /// Finds the bumps as the difference between a dive with them and a dive without. They have the given rate, length
-    /// and strength. After a bump the vehicle moves as fast as before it.
+    /// Finds the bumps as the difference between a dive with bumps and a dive without. Checks their rate, length and
+    /// strength. After a bump the vehicle moves as fast as before it.
     #[test]
     fn bumps_have_the_given_rate_length_and_strength() {
         let (plain, with) = (Bench::long("").run::<Inertia>("imu"), Bench::long(KEYS).run::<Inertia>("imu"));

@@ -40,7 +40,7 @@ struct Parameters {
 #[derive(Component)]
 struct ImuVibration {
     parameters: Parameters,
-    /// Phases of the vibration, radians: for each axis that of the force, then for each axis that of the turn rate.
+    /// Phases of the vibration, radians: for the force along each axis, then for the turn rate about each axis.
     phases_rad: [f64; 6],
 }
 
@@ -94,7 +94,8 @@ impl ImuVibration {
         let Parameters { frequency_hz, accel_mps2, gyro_radps } = self.parameters;
         let half_rad = math::TAU / 2.0 * frequency_hz * inertia.period.as_secs_f64();
         let kept = if half_rad > 0.0 { math::sin(half_rad) / half_rad } else { 1.0 };
-        // Whole turns are removed from the phase first, so that no digits are lost after hours of diving.
+        // Whole turns are removed from the phase before the sine is computed, so that no digits are lost after hours of
+        // diving.
         let turns = frequency_hz * inertia.at.since(START).as_secs_f64();
         let now_rad = math::TAU * math::wrap(turns, 1.0);
         let [a, b, c, d, e, f] = self.phases_rad.map(|phase_rad| math::sin(now_rad + phase_rad));
@@ -114,7 +115,7 @@ mod tests {
     /// Compares the samples with an oscillation of 83 Hz that is integrated over each sample's period in many small
     /// steps.
     ///
-    /// The phase of each axis is found from the first samples and fits all samples. No two axes have the same phase.
+    /// The phase of each axis, found from the first samples, must fit all samples. No two axes may have the same phase.
     #[test]
     fn samples_are_means_of_a_separate_oscillation_per_axis() {
         let keys = "[effects.imu_vibration]\nfrequency_hz = 83\naccel_mps2 = 4\ngyro_degps = 6\n";

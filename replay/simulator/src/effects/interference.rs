@@ -55,7 +55,7 @@ const APART_M: f64 = 70.0;
 
 #[derive(Debug, Clone, Copy)]
 struct Parameters {
-    /// Number of the group of heads. Heads with the same number share a frequency.
+    /// Number of the group to which the head belongs. Heads in one group share a frequency.
     frequency: usize,
     share: f64,
     margin_rad: Option<f64>,
@@ -167,8 +167,8 @@ struct Ear<'a> {
     ray: &'a Ray,
     stopped: bool,
     step: u64,
-    /// Least and largest range at which the head takes a sound as its echo, m. Each sound that is taken lowers the
-    /// largest range.
+    /// Least and largest range at which the head takes a sound as its echo, m. Each sound that the head takes lowers
+    /// its largest range.
     within_m: [f64; 2],
     /// Whether this head has taken another head's ping as its echo.
     heard: bool,
@@ -246,7 +246,8 @@ impl Ear<'_> {
 impl Hears {
     /// Upper bound of the distance to a wall that still reflects this head's sound audibly, m.
     fn rings_m(&self) -> f64 {
-        // The factor 1.5 is larger than the ratio of any two speeds of sound in water.
+        // The factor 1.5 allows for another speed of sound. It is larger than the ratio of any two speeds of sound in
+        // water.
         self.spec.range_m[1] * 1.5
     }
 }

@@ -43,7 +43,7 @@ pub(super) fn or_zero(
 
 /// Checks that at least one of an effect's keys isn't zero, so that the effect changes something.
 ///
-/// Errors: all of these keys are zero or absent.
+/// Errors: all of the keys are zero or absent.
 pub(super) fn some_not_zero(table: &Section<'_>, values: &[(&'static str, f64)]) -> Result<(), ConfigError> {
     if values.iter().any(|(_, value)| *value != 0.0) {
         return Ok(());

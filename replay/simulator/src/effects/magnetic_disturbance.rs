@@ -18,7 +18,7 @@ use crate::random::Stream;
 use crate::sensing::{Samples, Scenery};
 use crate::stages::Stage;
 
-/// Length of the stretches into which the tunnel is divided, m. Each contains at most one random disturbance.
+/// Length of the stretches into which the tunnel is divided, m. Each stretch contains at most one random disturbance.
 const CELL_M: f64 = 1.0;
 
 /// Steel turns the attitude of an inertial unit about the vertical.

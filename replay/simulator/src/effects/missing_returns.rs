@@ -134,7 +134,7 @@ impl Parameters {
     }
 }
 
-/// The echo of a ping as it was before this effect.
+/// The echo of a ping before this effect changes it.
 #[derive(Debug, Clone, Copy)]
 struct Echo {
     range_m: Option<f64>,

@@ -61,24 +61,24 @@ pub use targets::PerSensor;
 
 /// All effects. Within a stage, systems run in the order of this list, whatever the order in the scene.
 pub const KINDS: [&dyn EffectKind; 38] = [
-    // Effects that make the vehicle differ from its file.
+    // The next effects make the vehicle differ from its file.
     &mount_error::MountErrorKind,
-    // Effects on the turning of heads, and on the pose from which heads look.
+    // The next effects act on the turning of heads, and on the pose from which heads look.
     &start_phase_error::StartPhaseErrorKind,
     &sector_end_slowing::SectorEndSlowingKind,
     &skipped_steps::SkippedStepsKind,
     &head_stalls::HeadStallsKind,
     &motion_within_turn::MotionWithinTurnKind,
-    // Effects on the objects that a beam meets: wall and obstacles.
+    // The next effects act on the objects that a beam meets: wall and obstacles.
     &beam_cone::BeamConeKind,
     &occlusion::OcclusionKind,
-    // Effects on the paths of sound.
+    // The next effects act on the paths of sound.
     &echo_strength::EchoStrengthKind,
     &multipath::MultipathKind,
     &side_lobes::SideLobesKind,
     &interference::InterferenceKind,
     &near_returns::NearReturnsKind,
-    // Effects of the processing in the sonar.
+    // The next effects act in the sonar's processing.
     &missing_returns::MissingReturnsKind,
     &outliers::OutliersKind,
     &stuck_range::StuckRangeKind,
@@ -86,10 +86,10 @@ pub const KINDS: [&dyn EffectKind; 38] = [
     &sound_speed_profile::SoundSpeedProfileKind,
     &range_noise::RangeNoiseKind,
     &range_quantisation::RangeQuantisationKind,
-    // Effects on the vehicle's trajectory.
+    // The next effects act on the vehicle's trajectory.
     &current::CurrentKind,
     &pilot_drift::PilotDriftKind,
-    // Effects on depth sensors and inertial units.
+    // The next effects act on depth sensors and inertial units.
     &depth_noise::DepthNoiseKind,
     &depth_steps::DepthStepsKind,
     &imu_noise::ImuNoiseKind,
@@ -97,15 +97,15 @@ pub const KINDS: [&dyn EffectKind; 38] = [
     &imu_vibration::ImuVibrationKind,
     &imu_bumps::ImuBumpsKind,
     &magnetic_disturbance::MagneticDisturbanceKind,
-    // Effects on the cable counter.
+    // The next effects act on the cable counter.
     &tether_slack::TetherSlackKind,
     &tether_scale::TetherScaleKind,
     &tether_slip::TetherSlipKind,
     &tether_lag::TetherLagKind,
     &tether_quantum::TetherQuantumKind,
-    // Effects that are faults of devices.
+    // The next effects are faults of devices.
     &device_faults::DeviceFaultsKind,
-    // Effects on the clocks of devices and on the lines to them.
+    // The next effects act on the clocks of devices and on the lines to them.
     &clock_drift::ClockDriftKind,
     &line_delay::LineDelayKind,
     &byte_errors::ByteErrorsKind,
@@ -142,7 +142,8 @@ impl Named {
         self.0.iter().any(|(kind, _)| kind.name() == name)
     }
 
-    /// Adds the effects from the `[effects]` tables of the TOML text `tables`. None of them may be present already.
+    /// Adds the effects from the `[effects]` tables of the TOML text `tables`. The scene must not name any of these
+    /// effects itself.
     ///
     /// Errors: see [`EffectKind::read`].
     pub(crate) fn and(mut self, tables: &str, facts: &Facts) -> Result<Self, ConfigError> {

@@ -149,8 +149,8 @@ mod tests {
         Ray { origin, direction, hit: environment.cast(origin, direction, 100.0) }
     }
 
-    /// If the rectangular tunnel is mirrored at each wall that the beam meets, the reflected beam becomes a straight
-    /// line through the mirrored copies of the tunnel.
+    /// The expected range follows from mirroring: if the rectangular tunnel is mirrored at each wall that the beam
+    /// meets, the reflected beam becomes a straight line through the mirrored copies of the tunnel.
     #[test]
     fn multipath_range_in_a_rectangular_tunnel_matches_a_straight_beam_through_mirrored_tunnels() {
         let (half_width_m, height_m, [y, z]) = (3.0, 5.0, [0.7, 2.1]);
@@ -159,8 +159,8 @@ mod tests {
             let angle_rad = (f64::from(k) + 0.37) * math::TAU / 720.0;
             let ray = cast(&room, [y, z], angle_rad);
             let [dy, dz] = [ray.direction.y(), ray.direction.z()];
-            // Distances along the straightened beam to the first walls: `to_side` to the side wall, the other one to
-            // floor or ceiling.
+            // Distances along the straightened beam to the first walls: `to_side` to the side wall, and the other
+            // distance to floor or ceiling.
             let to_side = if dy > 0.0 { (half_width_m - y) / dy } else { (-half_width_m - y) / dy };
             let to_flat = if dz > 0.0 { (height_m - z) / dz } else { -z / dz };
             let mut crossings =

@@ -139,7 +139,8 @@ mod tests {
         pairs.map(|(was, is)| is.filter(|_| was != is)).collect()
     }
 
-    /// Consecutive pings that hit a cluster have one range, with the given spread. The next cluster has another range.
+    /// Consecutive pings that hit one cluster have the same range, except for the given spread. The next cluster has
+    /// another range.
     #[test]
     fn near_return_clusters_have_the_given_share_run_length_and_spread() {
         let (share, mean) = (0.1, 6.0);

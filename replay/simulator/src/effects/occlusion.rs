@@ -43,7 +43,7 @@ struct Occlusion {
 }
 
 /// For each beam of the present slice, whether a part of the vehicle stops the beam before the wall. Effects that run
-/// later use this.
+/// later use this list.
 #[derive(Debug, Clone, Default, Component)]
 pub(super) struct Stopped(Vec<bool>);
 
@@ -170,7 +170,7 @@ mod tests {
         let half_rad = math::asin(radius_m / 0.3);
         let mut hidden = 0;
         for ((angle_rad, range_m), wall_m) in dived.soundings(0).into_iter().zip(base.ranges_m(0)) {
-            // The other head is to the right of this head, at 270 degrees.
+            // The other head is to the right of the tested head, at 270 degrees.
             let off_rad = math::wrap_signed(angle_rad - 1.5 * math::PI, math::TAU);
             if off_rad.abs() < half_rad {
                 // Range at which the beam meets a circle of this radius, whose centre is 0.3 m from the sonar.

@@ -11,10 +11,10 @@ use crate::trajectory::{Offsets, wandering};
 
 /// The vehicle drifts left and right, up and down, and turns, as under a pilot.
 ///
-/// Each component varies smoothly and independently up to a largest value either way, its reach: `across_m`, `up_m`,
-/// `roll_deg`, `pitch_deg`, `yaw_deg`. The standard deviation of a component is 0.4 of its reach. `period_s` (30 by
-/// default) is the period of the drift. The control points of a cubic B-spline are half a period apart. Source: Jorge
-/// et al. 2021, §8.1 (the pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
+/// Each component varies smoothly and independently. Its largest value either way is called its reach: `across_m`,
+/// `up_m`, `roll_deg`, `pitch_deg`, `yaw_deg`. The standard deviation of a component is 0.4 of its reach. `period_s`
+/// (30 by default) is the period of the drift. The control points of a cubic B-spline are half a period apart. Source:
+/// Jorge et al. 2021, §8.1 (the pilot can drift 1.5 m vertically and horizontally, the heading 15 degrees).
 pub(super) struct PilotDriftKind;
 
 #[derive(Debug, Clone, Copy)]

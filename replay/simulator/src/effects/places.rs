@@ -91,8 +91,8 @@ mod tests {
     use crate::TruthRow;
     use crate::testing::{Dive, assert_share};
 
-    /// Chainages of soundings, and whether the effects changed the soundings. The sonar is at the vehicle's middle, so
-    /// its chainage is the vehicle's true chainage.
+    /// Chainage of each sounding, and whether the effects changed the sounding. The sonar is at the vehicle's middle,
+    /// so its chainage is the vehicle's true chainage.
     fn touched(effects: &str) -> Vec<(f64, bool)> {
         let dive = Dive { seconds: 100.0, ..Dive::with_head() };
         let range_m = |row: &TruthRow| row.sounding.and_then(|sounding| sounding.measured.range_m);

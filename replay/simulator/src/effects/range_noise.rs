@@ -74,7 +74,7 @@ fn scatter(
             let Some(Parameters { sd_m, sd_share }) = noise.places.here(&scenery, ray) else { continue };
             if let Some(range_m) = &mut sounding.range_m {
                 let [by, _] = noise.stream.at(step).normal();
-                // Added noise must not make a range negative.
+                // A range must not become negative, even if the added noise is negative.
                 *range_m = (*range_m + by * (sd_m + sd_share * *range_m)).max(0.0);
             }
         }

@@ -18,7 +18,7 @@ pub(super) struct Runs {
 }
 
 impl Runs {
-    /// Creates the chain in which runs of mean length `mean` contain this share of the pings.
+    /// Creates the chain in which runs of mean length `mean` contain the share `share` of the pings.
     pub(super) fn new(share: f64, mean: f64) -> Self {
         Self { share, begin: share / (mean * (1.0 - share)), go_on: 1.0 - 1.0 / mean }
     }

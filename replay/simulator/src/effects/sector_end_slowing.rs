@@ -111,7 +111,8 @@ mod tests {
     const KEYS: &str = "[effects.sector_end_slowing]\nlag_ms = 150\n";
     const LAG_S: f64 = 0.15;
 
-    /// The command c(t) = w t grows from rest. With time constant T, the head's angle is y = w (t - T + T exp(-t / T)).
+    /// The commanded angle c(t) = w t grows from rest. With time constant T, the head's angle is y = w (t - T + T
+    /// exp(-t / T)).
     #[test]
     fn lag_at_sector_ends_matches_its_closed_form() {
         let (plain, slowed) = (pings(""), pings(KEYS));
@@ -127,8 +128,8 @@ mod tests {
         }
     }
 
-    /// The command has the rate w, and its sign changes at time 0, long after the previous change. With time constant
-    /// T, the head then moves at w (2 exp(-t / T) - 1), and reverses at T ln 2.
+    /// The commanded angle has the rate w, whose sign changes at time 0, long after the previous change. With time
+    /// constant T, the head then moves at w (2 exp(-t / T) - 1), and reverses at T ln 2.
     #[test]
     fn head_steps_are_short_at_reversals_and_full_elsewhere() {
         let (plain, slowed) = (pings(""), pings(KEYS));

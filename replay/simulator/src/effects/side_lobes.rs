@@ -96,8 +96,8 @@ impl Effect for PerSensor<Places<Parameters>> {
     }
 }
 
-/// Shortest range of a side lobe, m. Only lobes that meet the wall nearer than `near_m` and more perpendicularly than
-/// the axis count.
+/// Shortest range of a side lobe, m. Only those lobes count that meet the wall nearer than `near_m` and more
+/// perpendicularly than the beam's axis.
 fn lobe_m(environment: &Environment, ray: &Ray, angle_rad: f64, near_m: f64) -> Option<f64> {
     let least = ray.hit.map_or(0.0, |hit| squareness(ray.direction, hit.normal));
     let (sine, cosine) = math::sin_cos(angle_rad);

@@ -16,7 +16,7 @@ use crate::random::Stream;
 use crate::sensing::Samples;
 use crate::stages::Stage;
 
-/// From time to time a head misses a commanded step. From then on it lags by that step, since hosts command steps and
+/// From time to time a head misses a commanded step. From then on it lags by that step, because hosts command steps and
 /// not angles.
 ///
 /// `per_thousand` is the mean number of missed steps in a thousand. Each step is missed independently. If `is_reported` is

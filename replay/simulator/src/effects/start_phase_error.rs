@@ -18,8 +18,8 @@ use crate::random::Stream;
 /// A head that turns continuously starts at another angle. A head in a sector keeps its sector and starts at another
 /// point of its sweep. With `max_deg`, the angle is uniformly distributed up to this value either way. With `sd_deg`,
 /// it is normally distributed. `offsets_deg` gives the angles, one for each head of the table, in order. Without any of
-/// these keys, `max_deg` is 180. In a sector the angle is a fraction of the sweep: 360 degrees are one sweep there and
-/// back. Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
+/// these keys, `max_deg` is 180. In a sector the angle is a fraction of the sweep: 360 degrees stand for one sweep
+/// there and back. Source: Jorge et al. 2021, §8.2 (Figure 12, without alignment).
 pub(super) struct StartPhaseErrorKind;
 
 #[derive(Debug, Clone, PartialEq)]

@@ -37,7 +37,7 @@ struct TetherLag {
 
 impl EffectKind for TetherLagKind {
     fn name(&self) -> &'static str {
-        // Scenes use this name for the effect, although the module has another name.
+        // Scenes call the effect by this name, although the module has another name.
         "late_winding"
     }
 
@@ -102,8 +102,8 @@ mod tests {
         TetherLag { parameters, counted: None, winding: false }
     }
 
-    /// With hold distance h, vehicle speed v and drum speed w, the drum stands still for h / v, and then winds for h /
-    /// (w - v). The mean lag of the count is h / 2.
+    /// With the hold distance h, the vehicle's speed v and the drum's speed w, the drum stands still for h / v, and
+    /// then winds for h / (w - v). The mean lag of the count is h / 2.
     #[test]
     fn cable_count_lags_in_a_sawtooth_at_steady_vehicle_speed() {
         let (mut winding, period_s) = (winding(), 0.01);

@@ -118,8 +118,8 @@ mod tests {
                 let tension_n = drag_npm * (f64::from(rod) + 0.5) * rod_m;
                 reach_m += rod_m * (1.0 + tension_n / stiffness_n);
             }
-            // Here the drag is computed from the counted length instead of the stretched length. This changes the
-            // result by about the square of the strain.
+            // Here the drag is computed from the counted length, which is shorter than the stretched length. This
+            // changes the result by about the square of the strain.
             let strain = drag_npm * counted_m / (2.0 * stiffness_n);
             let off = parameters.counted_m(reach_m) / counted_m - 1.0;
             assert!(off.abs() < 1.01 * strain * strain + 1e-9, "{counted_m}: {off}");

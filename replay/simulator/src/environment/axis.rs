@@ -18,7 +18,7 @@ const LARGEST_TURN_RAD: f64 = PI * (1.0 + 1e-12);
 /// The tunnel's axis, horizontal at z = 0. It continues straight before chainage 0 and beyond the last piece.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
-    /// The pieces, without gaps, from -infinity to +infinity of chainage.
+    /// Pieces of the axis, without gaps, from -infinity to +infinity of chainage.
     pieces: Vec<Piece>,
 }
 
@@ -114,7 +114,7 @@ impl Axis {
         [chainage_m, y, point.z()]
     }
 
-    /// Number of the piece nearest to a point. Also the point's chainage, and its distance to the left of the axis, m.
+    /// Number of the piece nearest to a point, the point's chainage, m, and its distance to the left of the axis, m.
     pub(super) fn locate(&self, plan: Yz) -> (usize, f64, f64) {
         let mut nearest = (0, 0.0, 0.0);
         let mut least = f64::INFINITY;
@@ -171,8 +171,8 @@ impl Piece {
         if curvature_pm == 0.0 {
             return start;
         }
-        // Angles about the centre of an arc are measured from the middle of the arc. They stay within a quarter turn,
-        // far from the wrap at half a turn.
+        // Angles about the centre of an arc are measured from the middle of the arc, so that they stay within a quarter
+        // turn, far from the wrap at half a turn.
         let anchor_m = from_m + length_m / 2.0;
         let heading_rad = heading_rad + curvature_pm * length_m / 2.0;
         let Station { at, tangent } = start.station(anchor_m);

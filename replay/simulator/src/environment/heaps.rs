@@ -10,8 +10,8 @@ use super::keys::{self, Kind};
 use super::placing::Site;
 use super::widths::floor_m;
 
-/// Largest displacement of the wall towards the profile's reference point, as a share of the wall's distance from
-/// that point.
+/// Largest displacement of the wall towards the profile's reference point, as a share of the wall's distance from the
+/// reference point.
 const DEEPEST_SHARE: f64 = 0.8;
 /// Largest ratio of the depth of a displaced patch to its length and width. It limits the steepness of the wall to
 /// 57.5 degrees.

@@ -7,8 +7,8 @@ use headrace_geometry::math;
 pub(super) struct Index {
     first_m: f64,
     bucket_m: f64,
-    /// Position in `numbers` at which each bucket's list starts, followed by the end of the last list. Empty if there
-    /// are no objects.
+    /// Position in `numbers` at which each bucket's list starts, followed by the end of the last list. The list is
+    /// empty if there are no objects.
     starts: Vec<usize>,
     /// Numbers of the indexed objects, bucket by bucket.
     numbers: Vec<u32>,
@@ -16,7 +16,7 @@ pub(super) struct Index {
 
 /// Length of a bucket, m: about the length of a boulder, and several times the chainage that a profiler's ray spans.
 const BUCKET_M: f64 = 1.0;
-/// Maximum number of buckets. A tunnel that needs more has longer buckets instead.
+/// Maximum number of buckets. A tunnel that would need more buckets has longer ones instead.
 const MOST_BUCKETS: f64 = 65_536.0;
 
 impl Index {

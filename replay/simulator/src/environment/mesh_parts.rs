@@ -6,7 +6,7 @@ use super::vector::{Face, Frame, Ray, V3};
 use crate::mesh::Mesh;
 
 /// Least distance of a point from the end planes of a mesh wall, m. A point nearer to an end plane is moved to this
-/// distance, because the mesh is open in that plane.
+/// distance, because the mesh is open in the end plane.
 const INTO_M: f64 = 1e-7;
 
 /// A closed mesh that is a body in the water.

@@ -82,8 +82,8 @@ fn parse_body(
         let why = format!("reaches out of the tunnel, which goes from 0 to {} m", site.length_m);
         return Err(misplaced(table, (from_m, to_m), &why));
     }
-    // In a bend, the x of a corner doesn't give the corner's chainage. The mesh is therefore assumed to reach as far
-    // ahead and behind as its farthest corner is from the origin.
+    // In a bend, the chainage of a mesh's corner doesn't follow from the corner's x. The mesh is therefore assumed to
+    // reach as far ahead and behind as its farthest corner is from the origin.
     let reach_m = corners.iter().map(|(x, y)| math::hypot(*x, *y)).fold(0.0, f64::max);
     let reach_m = if site.axis.is_straight() { [back_m, ahead_m] } else { [-reach_m, reach_m] };
     let span_m = span_m(site.axis, chainage_m, reach_m);

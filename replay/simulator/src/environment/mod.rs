@@ -66,7 +66,7 @@ pub struct Environment {
     design: Profile,
     tube: Tube,
     rough: Roughness,
-    /// Whether the tunnel is straight, as designed, and empty. If so, rays are cast against the profile alone.
+    /// Whether the tunnel is straight, exactly as designed, and empty. If so, rays are cast against the profile alone.
     plain: bool,
     solids: Vec<Placed<Solid>>,
     hollows: Vec<Placed<Hollow>>,
@@ -249,14 +249,14 @@ impl Environment {
 
     /// Replaces the range to the smooth wall by the range to the rough wall.
     ///
-    /// The point stays on the smooth wall, because the side on which the water is must remain certain.
+    /// The point stays on the smooth wall, because it must remain certain on which side of the point the water is.
     fn roughened(&self, hit: Hit, direction: Vec3<Tunnel>, chainage_m: impl FnOnce() -> f64) -> Hit {
         let cosine = -direction.dot(&hit.normal);
         let deeper_m = self.rough.deeper_m(hit.point, (hit.range_m, cosine), chainage_m);
         Hit { range_m: hit.range_m + deeper_m, ..hit }
     }
 
-    /// Range to the smooth wall, m. This takes less time than [`Environment::cast`].
+    /// Range to the smooth wall, m. This function is faster than [`Environment::cast`].
     ///
     /// Allocates: no.
     pub fn range_m(&self, origin: Point3<Tunnel>, direction: Vec3<Tunnel>, far_m: f64) -> Option<f64> {
@@ -342,8 +342,8 @@ impl Environment {
     fn start_in_hollow(&self, ray: &Ray) -> Option<Reach> {
         let around = |hollow: &&Placed<Hollow>| hollow.shape.contains(ray.origin);
         let hollow = self.hollows.iter().find(around)?;
-        // The reported wall is provisional. It makes the caller search for hollows at range 0, where it finds the
-        // hollow that contains the origin.
+        // The reported wall is provisional. It makes the caller search for hollows at range 0, so that the caller finds
+        // the hollow that contains the origin.
         Some(Reach { t_m: 0.0, stop: Some(Stop::Wall(None)), from_m: hollow.span_m.0, to_m: hollow.span_m.1 })
     }
 
@@ -376,12 +376,12 @@ impl Environment {
         }
     }
 
-    /// Of the hollows at the end of the ray, finds the hollow in which the ray gets farthest. Returns the range of the
-    /// hollow's end, the normal there, and the hollow.
+    /// Finds, among the hollows at the end of the ray, the hollow in which the ray gets farthest. Returns the range of
+    /// the hollow's end, the normal there, and the hollow.
     fn longest_hollow(&self, ray: &Ray, reach: &Reach) -> Option<(f64, V3, &Placed<Hollow>)> {
         let on_wall = matches!(reach.stop, Some(Stop::Wall(_))) && reach.t_m > 0.0;
         // The index lists hollows by the chainage of their openings. Deeper in the rock, a ray may pass into any other
-        // hollow.
+        // hollow, so all hollows are searched there.
         let (near, all) = if on_wall {
             (self.hollows_by_chainage.near(reach.from_m, reach.to_m), &[][..])
         } else {

@@ -2,7 +2,7 @@
 
 use super::vector::{Face, Ray, V3};
 
-/// A wall of triangles. No value of this type exists in a build without the feature `mesh`.
+/// A wall of triangles. In a build without the feature `mesh`, the type has no values.
 #[derive(Debug, Clone)]
 pub(super) enum MeshWall {}
 

@@ -151,7 +151,7 @@ pub(super) fn gate(
         scale: enlarged,
     };
     let span_m = ground.span_m(chainage_m, width_m / 2.0);
-    // The bulkhead may reach into the rock, because no ray gets there. It must be at least as large as the slot.
+    // The bulkhead must be at least as large as the slot. It may reach into the rock, because no ray gets there.
     let reach_m = enlarged * profile.farthest_m(profile.reference());
     let bulkhead = closed.then(|| Placed {
         shape: Solid::Block(

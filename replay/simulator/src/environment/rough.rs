@@ -11,8 +11,8 @@ use super::keys;
 use super::scatter::Scatter;
 use crate::stretch::Stretch;
 
-/// Lower limit of the cosine of incidence when a height is converted to a change of range. At more grazing incidence
-/// the bumps hide the hollows between them.
+/// Lower limit of the cosine of incidence when a height is converted to a change of range. At more grazing incidence,
+/// the bumps of the wall hide the hollows between them.
 const LEAST_COSINE: f64 = 0.25;
 /// Standard deviation of the sum of four 16-bit random numbers, in units of the range of one such number: the square
 /// root of 4 / 12.
@@ -57,7 +57,8 @@ impl Roughness {
 
     /// Difference between the range to the rough wall and the range to the smooth wall, m.
     ///
-    /// The beam meets the smooth wall at `point`. Its range there is `range_m`, and `cosine` is that of its incidence.
+    /// The beam meets the smooth wall at `point`. The range to this point is `range_m`, and `cosine` is the cosine of
+    /// the beam's incidence.
     pub(super) fn deeper_m(
         &self,
         point: Point3<Tunnel>,
@@ -96,7 +97,7 @@ impl Heights {
             squares += weight * weight;
         }
         // A weighted mean of several random numbers has a smaller standard deviation than each number. The division by
-        // the root of the squared weights restores the standard deviation `sd_m`.
+        // the root of the sum of squared weights restores the standard deviation `sd_m`.
         self.sd_m * sum / math::sqrt(squares)
     }
 

@@ -14,7 +14,7 @@ use super::vector::{Ray, V3, along, dot, unit};
 /// Largest distance between a point and a hollow at which the point counts as in the hollow, m.
 ///
 /// A face of a hollow may lie on the wall itself, like the upper face of a ditch in a flat floor. Rounding errors must
-/// not put wall between tube and hollow.
+/// not leave a wall between tube and hollow.
 pub(super) const SKIN_M: f64 = 1e-6;
 
 /// A solid body that stops a ray.

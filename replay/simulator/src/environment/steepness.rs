@@ -76,8 +76,8 @@ impl Steepness {
 
     /// Slopes of the gauge within the cross-section and along the tunnel.
     fn at(&self, view: &View, bulges: &[Bulge], scale: f64, scale_slope_pm: f64) -> (f64, f64) {
-        // A bulge counts for this view if it comes within two sampled directions of the view's direction. `margin_m` is
-        // the distance on the wall between two sampled directions, taken twice.
+        // A bulge counts for this view if it is at most two sampled directions away from the view's direction.
+        // `margin_m` is the distance on the wall between two sampled directions, taken twice.
         let margin_m = 2.0 * TAU / f64::from(DIRECTIONS) * view.radius_m * view.radius_m / view.tangent_m;
         let (mut inwards_m, mut outwards_m, mut along, mut across) = (0.0, 0.0, 0.0, 0.0);
         for bulge in bulges.iter().filter(|b| b.covers(view.arc_m, self.perimeter_m, margin_m)) {

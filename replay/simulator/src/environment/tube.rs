@@ -28,8 +28,8 @@ const LEAST_STEP_M: f64 = 1e-4;
 const ROOT_M: f64 = 1e-11;
 /// Displacement of the wall above which a hit is attributed to the feature that displaced the wall there, m.
 const FEATURE_M: f64 = 1e-3;
-/// The normal of a displaced wall is computed from differences between points on both sides of the hit. This is half
-/// the distance between them, m.
+/// The normal of a displaced wall is computed from differences between points on both sides of the hit. This constant
+/// is half the distance between the two points, m.
 const NORMAL_STEP_M: f64 = 1e-5;
 
 /// The tunnel's wall along the whole tunnel, except openings.
@@ -59,7 +59,7 @@ struct Stretch {
     scale_slope_pm: f64,
     /// Numbers of the bulges that extend into the stretch.
     bulges: Vec<usize>,
-    /// Number of the mesh that is the wall of this stretch; `None` if the profile is.
+    /// Number of the mesh that is the wall of this stretch; `None` if the profile is the wall.
     mesh: Option<usize>,
     /// Reciprocal of an upper bound on the slope of the gauge, m. It determines the length of steps along rays.
     step_m: f64,
@@ -93,8 +93,8 @@ impl Tube {
         let mut breaks: Vec<f64> = axis.pieces().iter().map(|piece| piece.from_m).collect();
         breaks.extend(scales.breaks());
         breaks.extend(bulges.iter().flat_map(|bulge| [bulge.begin_m(), bulge.end_m()]));
-        // Breaks within a mesh are removed, so that each mesh has a single stretch, even if two straight pieces of the
-        // axis meet there.
+        // Boundaries of stretches within a mesh are removed, so that each mesh has a single stretch, even if two
+        // straight pieces of the axis meet there.
         let spans: Vec<(f64, f64)> = meshes.iter().map(MeshWall::span_m).collect();
         breaks.retain(|at_m| !spans.iter().any(|(from_m, to_m)| from_m < at_m && at_m < to_m));
         breaks.extend(spans.iter().flat_map(|(from_m, to_m)| [*from_m, *to_m]));
@@ -309,7 +309,7 @@ impl Tube {
         if self.holds(to, ray.at(t_m)) {
             return None;
         }
-        // The tunnel's axis is straight at a mesh.
+        // The stretch with a mesh gives the direction, because the tunnel's axis is straight there.
         let [tx, ty] =
             if to.mesh.is_some() { to.piece.station(to.from_m) } else { from.piece.station(from.from_m) }
                 .tangent;
@@ -330,8 +330,8 @@ impl Tube {
         );
         match hit {
             Some(hit) => Some(t_m + hit.range_m),
-            // No wall is ahead in two cases. If the point is on the wall itself, the ray ends here. If the ray runs
-            // along the axis, it hits no wall.
+            // There are two cases without a wall ahead. If the point is on the wall itself, the ray ends at the point.
+            // If the ray runs along the axis, it hits no wall.
             None => (self.gauge(stretch, at) > 1.0 - 1e-9).then_some(t_m),
         }
     }

@@ -1,4 +1,4 @@
-//! Calls. A call is a reason to simulate an effect, such as silt in the scene's water.
+//! Calls for effects. A call is a reason to simulate an effect, such as silt in the scene's water.
 
 /// An effect that a scene implies, with its tables.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -9,7 +9,7 @@ pub struct Called {
     pub by: Vec<String>,
     /// Tables of the effect, in the form in which a scene would contain them.
     pub tables: String,
-    /// Whether and how the effect is simulated.
+    /// Whether and how the implied effect is simulated.
     pub fate: Fate,
 }
 

@@ -27,7 +27,7 @@ const CABLES: [Cable; 1] = [Cable { name: "fathom", diameter_m: 0.0076, strength
 const ARAMID_STRAIN: f64 = 0.036;
 const FRICTION: f64 = 0.01;
 const DRAWN_MPS: f64 = 0.2;
-/// Distance on either side of an opening, m. Within it the opening's corners cause double reflections.
+/// Distance on either side of an opening within which the opening's corners cause double reflections, m.
 const BESIDE_M: f64 = 1.0;
 /// Length over which the end of a steel lining disturbs a compass, m, and the largest disturbance there, degrees. Both
 /// values are from the scene steel.toml.

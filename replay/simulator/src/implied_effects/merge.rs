@@ -13,8 +13,8 @@ const GROUPED: &str = "interference";
 
 type Keys = Vec<(&'static str, Value)>;
 
-/// Sensors that share tables; the ranges of chainage and the keys of these tables; and the sensors that the call names,
-/// which are kept only for the effect [`GROUPED`].
+/// Sensors that share tables; the ranges of chainage and the keys of these tables; and, for the effect [`GROUPED`]
+/// only, the sensors that the call names.
 type Shared<'a> = (Vec<&'a String>, Vec<Piece>, Option<Option<&'a Vec<String>>>);
 
 /// A table to write: the range of chainage where it applies, and its keys.
@@ -48,7 +48,7 @@ pub(super) fn merge(calls: &[Call]) -> Vec<Called> {
     all
 }
 
-/// The tables of an effect. Sensors with the same ranges of chainage and the same keys share tables.
+/// The tables of an effect. Sensors share tables if their ranges of chainage and their keys are the same.
 fn tables(effect: &str, calls: &[&Call]) -> String {
     let mut sensors: Vec<Option<&String>> = Vec::new();
     for call in calls {

@@ -33,8 +33,7 @@ fn implied_effects_are_simulated_only_if_the_scene_says_so() {
     assert!(fates(MURK).iter().all(|(_, fate)| *fate == Fate::NotTaken));
 }
 
-/// The displayed tables are equivalent to the implied effects. If the tables are copied into the scene, the devices
-/// send the same bytes.
+/// If the displayed tables of the implied effects are copied into the scene, the devices send the same bytes.
 #[test]
 fn implied_effects_give_the_same_messages_as_named_effects() {
     let called = format!("{MURK}[effects]\ntake = \"called\"\n");

@@ -25,7 +25,7 @@ const WELD: f64 = 1e-9;
 /// larger distance, it applies instead.
 const END: f64 = 0.02;
 /// Largest distance of a wall's opening from an end of the mesh, metres, if it is larger than the distance by [`END`].
-/// Either limit is reduced to a quarter of the wall's length, so that the ends stay apart.
+/// Neither limit may exceed a quarter of the wall's length, so that the ends stay apart.
 const END_M: f64 = 0.5;
 
 /// A checked surface of triangles.
@@ -35,7 +35,7 @@ pub(super) struct Surface {
     pub(super) faces: Vec<[u32; 3]>,
     /// Number that each face has in the input.
     pub(super) given: Vec<u32>,
-    /// Caps of triangles that close the openings of a wall.
+    /// Triangles that close the openings of a wall, one cap for each opening.
     pub(super) caps: Vec<Cap>,
     pub(super) low: [f64; 3],
     pub(super) high: [f64; 3],
@@ -224,7 +224,7 @@ fn holes(vertices: &[[f64; 3]], open: &[[u32; 2]]) -> Vec<Hole> {
     holes.into_values().collect()
 }
 
-/// Returns an error if the surface has any hole.
+/// Returns an error if there are any holes.
 fn refuse(vertices: &[[f64; 3]], holes: &[&Hole]) -> Result<(), MeshError> {
     // If several holes are equally large, the first one is reported.
     let Some(largest) = holes.iter().rev().max_by_key(|hole| hole.edges.len()) else {

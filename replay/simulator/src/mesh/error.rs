@@ -51,7 +51,7 @@ pub enum MeshError {
         /// Number of faces that meet at the edge.
         faces: usize,
     },
-    /// A mesh that is a body is not closed, or a mesh that is a wall is open between its ends.
+    /// A mesh that is a body has a hole, or a mesh that is a wall has a hole between its ends.
     #[error("the mesh has {holes} hole(s) where it must be closed; the largest has {edges} edges, one of them at {}", At(*at))]
     Hole {
         /// Number of holes, without the open ends of a wall.

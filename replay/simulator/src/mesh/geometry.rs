@@ -2,8 +2,8 @@
 //!
 //! Source: S. Woop, C. Benthin, I. Wald, "Watertight Ray/Triangle Intersection", JCGT 2(1), 2013. The side of the ray
 //! on which an edge passes is the sign of a difference of two products. Rounding keeps the order of the products, and
-//! swapping the ends of the edge changes only the sign. Two triangles with a common edge therefore agree on the side,
-//! or both find zero, which counts as inside. No ray passes between the two triangles.
+//! swapping the ends of the edge changes only the sign. Two triangles with a common edge therefore agree on the side of
+//! the ray, or both find zero, which counts as inside. No ray passes between the two triangles.
 
 use headrace_geometry::math;
 
@@ -14,7 +14,7 @@ const THIN: f64 = 1e-12;
 /// Factor that widens the interval of a box by more than its rounding error.
 const WIDER: f64 = 1.0 + 1e-15;
 
-/// Tells whether a ray crosses a triangle. Ambiguous cases have a value of their own.
+/// Tells whether a ray crosses a triangle. The cases that are ambiguous have a value of their own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Crossing {
     Beside,
@@ -45,7 +45,7 @@ struct Parts {
 impl Ray {
     /// Prepares a ray from an origin and a direction of any length. The ray ends at `far` times the direction's length.
     ///
-    /// A ray hits nothing if its direction is zero or not finite.
+    /// If the direction is zero or not finite, the ray hits nothing.
     pub(super) fn new(origin: [f64; 3], direction: [f64; 3], far: f64) -> Self {
         let [x, y, z] = direction.map(f64::abs);
         let axes = if z >= x && z >= y {
@@ -138,7 +138,7 @@ impl Parts {
         if whole.abs() > THIN * wide * deep {
             return Some((u * a[2] + v * b[2] + w * c[2]) / whole);
         }
-        // The areas consist of rounding errors only, because the triangle is seen as a line. The depth is therefore
+        // The triangle is seen as a line, so its computed areas are only rounding errors. The depth is therefore
         // computed from its longest side.
         let side = |p: [f64; 3], q: [f64; 3]| {
             let (x, y) = (q[0] - p[0], q[1] - p[1]);

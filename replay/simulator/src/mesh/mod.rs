@@ -97,8 +97,8 @@ impl Mesh {
     /// if there is no hit, or if a component of `origin` or `direction_unit` is not finite.
     pub fn cast(&self, origin: [f64; 3], direction_unit: [f64; 3], far_m: f64) -> Option<MeshHit> {
         let ray = Ray::new(origin, direction_unit, far_m);
-        // Range and face of the best hit. At equal ranges, the smallest face number wins. The tree alone returns the
-        // hit that it visits first.
+        // Range and face of the best hit. At equal ranges, the smallest face number is taken, because the tree alone
+        // would return the hit that it visits first.
         let best: Cell<Option<(f64, u32)>> = Cell::new(None);
         self.tree.find_best(
             f64::MAX,
@@ -124,7 +124,7 @@ impl Mesh {
     /// counts as inside. A point in two overlapping parts of the mesh counts as outside.
     pub fn contains(&self, point: [f64; 3]) -> bool {
         let (low, high) = self.bounds();
-        // All comparisons with NaN are false. Their negation therefore counts a point with NaN as outside.
+        // All comparisons with NaN are false, so the negated condition counts a point with NaN as outside.
         if !(0..3).all(|k| point[k] >= low[k] && point[k] <= high[k]) {
             return false;
         }

@@ -34,8 +34,8 @@ pub fn read(bytes: &[u8]) -> Result<Triangles, MeshError> {
     check(&header)?;
     widen_text(&mut header);
     let mut triangles = Triangles::default();
-    // An element without properties takes no bytes in the file. Its count in the header may be any number, so it must
-    // not decide how much memory is used.
+    // An element without properties takes no bytes in the file. Its count in the header may be any number, so the count
+    // must not decide how much memory is used.
     for element in header.elements.values().filter(|element| !element.properties.is_empty()) {
         match element.name.as_str() {
             "vertex" => {

@@ -234,7 +234,7 @@ fn no_ray_slips_between_triangles() {
             let (direction, distance) = toward(origin, target);
             let hit = mesh.cast(origin, direction, f64::INFINITY);
             let range = hit.unwrap_or_else(|| panic!("out by {target:?} from {origin:?}")).range_m;
-            // Odd rays start off the centre of the rough body, so a nearer face may hide the target.
+            // Rays with odd numbers start off the centre of the rough body, so a nearer face may hide the target.
             assert!(
                 range < distance + 1e-9 && (i % 2 == 1 || range > distance - 1e-9),
                 "{range}, not {distance}"
@@ -258,7 +258,7 @@ fn no_ray_from_the_axis_of_a_tube_slips_through_its_wall() {
 
 #[test]
 fn ranges_to_a_mesh_with_degenerate_triangles_are_exact() {
-    // A third vertex on an edge splits a triangle of the box's upper face. One of the three pieces has no area.
+    // An additional vertex on an edge splits a triangle of the box's upper face. One of the three pieces has no area.
     let mut t = cuboid([1.0, 1.0, 1.0]);
     let old =
         t.faces.iter().position(|face| face.contains(&4) && face.contains(&5) && face.contains(&7)).unwrap();

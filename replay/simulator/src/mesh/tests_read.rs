@@ -173,7 +173,7 @@ fn wrong_element_counts_in_ply_files_allocate_no_memory() {
     long_list.extend([0xFF; 4]);
     let words = refused(&long_list);
     assert!(words.contains("end of file") && words.contains("'face'"), "{words}");
-    // A file in text encoding that ends before it has as many elements as its header says.
+    // The file is in text encoding, and ends before it has as many elements as its header states.
     let text = file(u64::MAX, "uint").replace("binary_little_endian", "ascii");
     assert!(refused(text.as_bytes()).contains("end of file"));
 }

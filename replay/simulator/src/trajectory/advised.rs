@@ -14,11 +14,11 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A position depends on at most this many knots that are later than its own time.
+/// Maximum number of knots after a time on which the position at that time depends.
 const KNOTS_AHEAD: i64 = 3;
 /// Speed at which the pilot goes back to a missed stretch, m/s.
 const BACK_MPS: f64 = 0.2;
-/// Distance of a missed stretch behind the vehicle, m. From this distance on, the pilot goes back for the stretch.
+/// Distance of a missed stretch behind the vehicle from which on the pilot goes back for the stretch, m.
 const BEHIND_M: f64 = 3.0;
 /// Distance before a missed stretch from which the pilot passes it a second time, m.
 const RUN_UP_M: f64 = 2.5;
@@ -137,7 +137,7 @@ impl Advised {
         }
     }
 
-    /// Maximum duration of the dive, s. Once the pilot has finished, the actual duration.
+    /// Maximum duration of the dive, s. Once the pilot has finished, it is the actual duration.
     pub(super) fn duration_s(&self) -> f64 {
         self.ended_s.unwrap_or(self.pilot.at_most_s)
     }
@@ -202,7 +202,7 @@ impl Advised {
         }
     }
 
-    /// The advice that the pilot follows at `at_s`: the latest that was given at least `lag_s` earlier, if any.
+    /// The advice that the pilot follows at `at_s`: the latest advice that was given at least `lag_s` earlier, if any.
     fn advice_at(&self, at_s: f64) -> Option<PilotAdvice> {
         let by = START + DurNs::from_secs_f64((at_s - self.pilot.lag_s).max(0.0));
         let advice_list = |advice: &&PilotAdvice| advice.at <= by && by > MonoNs(START.0);

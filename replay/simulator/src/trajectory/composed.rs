@@ -46,7 +46,7 @@ impl Trajectory {
         Self { duration_s: advised.duration_s(), base: Base::Advised(Box::new(advised)), sways: Vec::new() }
     }
 
-    /// Whether the trajectory depends on advice to the pilot.
+    /// Whether the trajectory depends on a monitor's advice to the pilot.
     pub fn is_advised(&self) -> bool {
         matches!(self.base, Base::Advised(_))
     }

@@ -9,7 +9,8 @@ pub type Offsets = [f64; 6];
 
 /// Control points of a spline, spaced `spacing_s` apart in time. The first point lies one spacing before the start.
 ///
-/// The curve stays within the hull of four neighbouring points, so none of its values lies outside the range of theirs.
+/// The curve stays within the hull of four neighbouring points, so none of its values lies outside the range of these
+/// four points.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Knots {
     spacing_s: f64,
@@ -91,7 +92,7 @@ impl Knots {
 /// Control points are half a period apart and uniformly distributed. The standard deviation is 0.4 of the amplitude.
 pub fn wandering(stream: Stream, duration_s: f64, period_s: f64, reach: Offsets) -> Knots {
     Knots::new(duration_s, period_s / 2.0, |k| {
-        // Step numbers are not negative, but the first control point has number -1.
+        // One is added because step numbers are not negative, but the first control point has number -1.
         let step = (k + 1).unsigned_abs();
         let numbers = [0, 1, 2].map(|block| stream.block(step, block).uniform());
         let mut point = reach;

@@ -15,7 +15,7 @@ use super::recorded;
 use super::waypoints::{self, Waypoint};
 use crate::random::Stream;
 
-/// A dive may start or end outside the tunnel, up to this distance, m.
+/// Maximum distance outside the tunnel at which a dive may start or end, m.
 const OUTSIDE_M: f64 = 20.0;
 const CHAINAGE_M: RangeInclusive<f64> = -OUTSIDE_M..=1.0e6;
 const ACROSS_M: RangeInclusive<f64> = -200.0..=200.0;
@@ -114,7 +114,7 @@ fn legs(section: &Section<'_>, tunnel: Tunnel<'_>) -> Result<Trajectory, ConfigE
         let Some(parsed) = parsed else { continue };
         legs.push(parsed);
         chainage_m += parsed.distance_m * parsed.speed_mps.signum();
-        // Where a leg ends is known only if this leg and all previous legs are valid.
+        // The end of a leg is known only if this leg and all previous legs are valid.
         if legs.len() == number + 1 {
             tunnel.check(leg, "distance_m", chainage_m)?;
         }

@@ -11,7 +11,7 @@ use crate::random::Stream;
 const STEP_S: f64 = 0.5;
 /// Time constant of the vehicle's response to the pilot's joystick, s.
 const RESPONSE_S: f64 = 2.0;
-/// A dive counts as endless if it takes more than this many times as long as without stops.
+/// Largest ratio of a dive's duration to its duration without stops. A dive that takes longer counts as endless.
 const MOST_TIMES_AS_LONG: f64 = 50.0;
 
 /// Parameters of a pilot who gets no advice.
@@ -24,7 +24,7 @@ pub(super) struct Pilot {
     pub(super) across_m: [f64; 2],
     /// Speed while the vehicle moves, m/s.
     pub(super) speed_mps: f64,
-    /// Number of stops per hour and of reversals per hour.
+    /// Number of stops per hour; then number of reversals per hour.
     pub(super) stops_per_hour: f64,
     pub(super) backs_per_hour: f64,
     /// Shortest and longest duration of a stop, s. Shortest and longest distance of a reversal, m.

@@ -7,7 +7,7 @@ use super::waypoints::through;
 
 /// Interval of the knots, s. The spline smooths the recording over four such intervals.
 const SPACING_S: f64 = 0.1;
-/// Maximum duration of a recorded trajectory, s: two days.
+/// Maximum duration of a recorded trajectory, s. It is two days.
 const MAX_S: f64 = 172_800.0;
 
 /// A recorded pose with its time, s.

@@ -115,8 +115,8 @@ fn pilot_goes_back_the_given_distance() {
         backs += gone.windows(2).filter(|w| w[0] >= 0.0 && w[1] < 0.0).count() as f64;
         lost_m += trajectory.duration_s() - 190.0;
     }
-    // Each reversal costs three seconds for going back and three for driving the same distance again. The start of a
-    // dive costs 1.5 s.
+    // Each reversal costs three seconds for going back and three seconds for driving the same distance again. The start
+    // of each dive costs 1.5 s.
     let each_s = (lost_m - 50.0 * 1.5) / backs;
     assert!((each_s - 6.0).abs() < 0.3, "{each_s} of {backs}");
 }

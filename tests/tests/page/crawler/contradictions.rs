@@ -1,4 +1,4 @@
-//! Compares the figures of one moment. Each figure is compared wherever it appears, after its stated rounding.
+//! Compares the figures of one moment. Each figure is compared wherever it appears, with the tolerance of its rounding.
 
 use serde_json::Value;
 
@@ -13,7 +13,7 @@ const VERDICTS: [(&str, &str); 5] = [
     ("not_inspected_m", "not inspected"),
 ];
 
-/// Largest length that is judged between two updates, m.
+/// Largest length of wall that is judged between two updates, m.
 const JUDGED_SINCE_UPDATE_M: f64 = 1.01;
 
 /// Contradictions that have been found.
@@ -57,8 +57,8 @@ fn station(x_m: f64) -> String {
     format!("{sign}{km}+{:06.2}", (centimetres - 1e5 * km) / 100.0)
 }
 
-/// Whether a text is a speed that was rounded to the text's decimals in any direction. Within 2 % of its limit, a speed is
-/// shown as the limit.
+/// Whether a text is the speed `mps`, rounded up or down to the text's decimals. A difference of 2 % is also allowed,
+/// because a speed that is this close to its limit is shown as the limit.
 fn is_rounded(text: &str, mps: f64) -> bool {
     let step =
         if text.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 2) { 0.001 } else { 0.01 };
@@ -177,7 +177,7 @@ fn alerts(moment: &Moment, found: &mut Found) {
     }
 }
 
-/// The way back has the stretch of an active alert about missed wall.
+/// Compares an active alert about missed wall with the leg of the way back over the same stretch.
 fn legs(moment: &Moment, alert: &Value, found: &mut Found) {
     let Some(back) = &moment.back else { return };
     let same = |leg: &&Value| leg["to_m"] == alert["from_m"] && leg["from_m"] == alert["to_m"];
@@ -190,8 +190,9 @@ fn legs(moment: &Moment, alert: &Value, found: &mut Found) {
     }
 }
 
-/// Compares the sections of the page's wall with the metres. Open sections may lie beyond the coverage extent. Sections come
-/// with the tick that judges them, and metres with the next update, up to 0.2 s later.
+/// Compares the sections of the page's wall with the stated metres. Open sections aren't compared, because they may lie
+/// beyond the coverage extent. Sections come with the tick that judges them, and metres with the next update, up to 0.2
+/// s later.
 fn wall(moment: &Moment, found: &mut Found) {
     for ((key, _), shown_m) in VERDICTS.iter().zip(moment.metres).skip(1) {
         let stated_m = number(&moment.page, &format!("/metres/{key}")).unwrap();
@@ -261,7 +262,7 @@ fn alerts_of_terminal(moment: &Moment, title: &str, found: &mut Found) {
     }
 }
 
-/// The terminal's banner has the instruction of the line, and no other.
+/// Checks that the terminal's banner has the instruction of the state line, and no other instruction.
 fn instruction(state: &Value, screen: &str, found: &mut Found) {
     let banner: Vec<&str> = screen.lines().skip(1).take_while(|row| !row.starts_with("SPEED")).collect();
     let arrows: Vec<&str> = banner.iter().filter_map(|row| row.trim_start().strip_prefix("→ ")).collect();
@@ -310,7 +311,7 @@ pub(crate) fn of_result(end: &Value, summary: &str, report: &Value) -> Vec<Strin
     found.0
 }
 
-/// All dive times in a report, with their keys.
+/// Collects all dive times in a report, with their keys.
 fn times_in(of: &Value, to: &mut Vec<(String, f64)>) {
     const KEYS: [&str; 8] =
         ["at_s", "since_s", "rectified_s", "cleared_s", "flagged_s", "raised_s", "from_s", "to_s"];

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::address::ANY;
 
-/// Number of times that a screen is read until it shows the moment, every 50 ms.
+/// Largest number of times that a screen is read, every 50 ms, until it shows the moment.
 const READINGS: u32 = 100;
 
 /// Everything that the screens show at one moment.
@@ -32,7 +32,7 @@ pub(crate) struct Moment {
     pub(crate) screen: String,
 }
 
-/// A replay with a terminal and a page, and another replay of the same log with JSON lines.
+/// A replay with a terminal and a page, and a second replay of the same log with JSON lines.
 pub(crate) struct Crawl {
     screen: Screen,
     viewer: Viewer,
@@ -40,7 +40,7 @@ pub(crate) struct Crawl {
 }
 
 impl Crawl {
-    /// Starts both replays of `dive.mcap`. The first one is at the end of the log.
+    /// Starts both replays of `dive.mcap`. The replay with terminal and page is then at the end of the log.
     pub(crate) fn start(folder: &Folder) -> Self {
         let arguments = ["replay", "dive.mcap", "--tui", "--speed", "max", ANY, "--report", "report.json"];
         let screen = Screen::sized(folder, &arguments, (160, 70), &[("LANG", "C.UTF-8")]);
@@ -50,12 +50,12 @@ impl Crawl {
         let mut viewer = Viewer::connect_to(address, "", &[]).unwrap();
         viewer.until_type("ready");
         viewer.until("the end of the log", |viewer| viewer.state["playback"]["paused"] == true);
-        // Otherwise playback goes on after a jump.
+        // Without this pause, playback goes on after a jump.
         viewer.send(&json!({"do": "play", "command": "pause"}));
         Self { screen, viewer, lines: Lines::start(folder) }
     }
 
-    /// Jumps to the tick before this dive time.
+    /// Jumps to the last tick before the dive time `at_s`.
     fn jump(&mut self, at_s: f64) {
         let viewer = &mut self.viewer;
         let before = viewer.hello["instance"].clone();
@@ -63,7 +63,7 @@ impl Crawl {
         viewer.send(&json!({"do": "play", "command": "seek", "to_s": at_s}));
         viewer.until("the jump", |viewer| {
             let is_ready = viewer.others.iter().any(|other| other["type"] == "ready");
-            // The state may follow after the message that the page is ready.
+            // The state may arrive after the message that the page is ready.
             let now_s = viewer.state["now_s"].as_f64();
             let is_there = now_s.is_some_and(|now_s| (now_s - at_s).abs() < 0.05);
             viewer.hello["instance"] != before && is_ready && is_there
@@ -79,8 +79,8 @@ impl Crawl {
         self.viewer.state["playback"]["to_s"].as_f64().unwrap()
     }
 
-    /// Shows the tick after this dive time everywhere. A terminal is slower than the page, so it is read again as long as
-    /// `contradictions` finds any.
+    /// Shows the first tick after the dive time `at_s` on all screens. The terminal is slower than the page, so it is
+    /// read again as long as `contradictions` finds any.
     pub(crate) fn visit(
         &mut self,
         at_s: f64,
@@ -93,7 +93,7 @@ impl Crawl {
         let viewer = &mut self.viewer;
         let listed = line["alert_list"].as_array().unwrap();
         let numbers: Vec<u64> = listed.iter().filter_map(|alert| alert["number"].as_u64()).collect();
-        // The list of alerts may follow after the state.
+        // The list of alerts may arrive after the state.
         viewer.until("the moment", |viewer| {
             let has_alerts = numbers.iter().all(|number| viewer.alerts.contains_key(number));
             viewer.state["now_s"] == line["now_s"] && has_alerts
@@ -122,7 +122,8 @@ impl Crawl {
         moment
     }
 
-    /// Plays to the end, and ends the replay. Returns the page's last message, the summary on the terminal, and the report.
+    /// Plays to the end of the log, and ends the replay. Returns the page's last message, the summary on the terminal,
+    /// and the report.
     pub(crate) fn end(mut self, folder: &Folder) -> (Value, String, Value) {
         let to_s = self.last_s() + 1.0;
         self.viewer.send(&json!({"do": "play", "command": "seek", "to_s": to_s}));
@@ -165,7 +166,7 @@ impl Lines {
         serde_json::from_str(&line).unwrap()
     }
 
-    /// State line of the tick after this dive time.
+    /// State line of the first tick after the dive time `at_s`.
     fn visit(&mut self, at_s: f64) -> Value {
         self.command(&format!("seek {at_s:.9}s\nstep"));
         let mut state = Value::Null;

@@ -60,7 +60,7 @@ fn worked_example_2_encodes_and_decodes() {
 
 #[test]
 fn step_is_rounded_not_truncated() {
-    // In single precision, 0.9 / 0.3 is slightly less than 3.
+    // The step is slightly below 0.9 degrees, because 0.9 / 0.3 in single precision is slightly less than 3.
     let step_deg = f64::from(0.9_f32) - 1e-6;
     assert_eq!(Command { step_deg, ..example_1() }.encode().unwrap()[13], 3);
     let error = Command { step_deg: 1.5, ..example_1() }.encode().unwrap_err();

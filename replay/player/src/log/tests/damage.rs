@@ -350,7 +350,7 @@ fn error_for_a_file_other_than_mcap_shows_its_first_bytes() {
     assert!(error(b"#ROSBAG V2.0\n").contains("23 52 4f 53"));
 }
 
-/// Asserts that each missing message lies within the times of a reported loss.
+/// Asserts that the time of each missing message is within the times of a reported loss.
 fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     fn key(message: &Seen) -> (u64, u64, u32, &[u8]) {
         (message.1, message.2, message.3, &message.4)
@@ -370,7 +370,7 @@ fn missing_are_covered(got: &[Seen], seen: &[Seen], losses: &[Loss]) {
     }
 }
 
-/// Asserts that a change either has no effect or is reported, and that no spurious message is read.
+/// Asserts that a change either has no effect or is reported, and that no message is read that the log doesn't have.
 fn check_changed(bytes: Vec<u8>, seen: &[Seen], info: &LogInfo) {
     match LogReader::new(Cursor::new(bytes), "changed".to_owned()) {
         Ok(mut reader) => {

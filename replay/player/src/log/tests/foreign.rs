@@ -18,7 +18,7 @@ fn messages() -> Vec<(usize, u64, u32)> {
     let mut messages = Vec::new();
     for n in 0..400_u32 {
         let topic = usize::try_from(n * 7 % 4).unwrap();
-        // Times repeat, and go back by up to 30 messages.
+        // Log times repeat, and go back by up to 30 messages.
         messages.push((topic, 1000 + u64::from((n - n * 13 % 31 % (n + 1)) / 2), n));
     }
     messages

@@ -53,7 +53,7 @@ fn open(bytes: &[u8]) -> LogReader<Cursor<Vec<u8>>> {
     LogReader::new(Cursor::new(bytes.to_vec()), "test".to_owned()).unwrap()
 }
 
-/// Reads all messages of a log.
+/// Reads all messages that a reader delivers.
 fn read_all<R: std::io::Read + std::io::Seek>(reader: &mut LogReader<R>) -> Vec<Seen> {
     let mut seen = Vec::new();
     while let Some(message) = reader.next().unwrap() {

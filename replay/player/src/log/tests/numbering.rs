@@ -98,7 +98,8 @@ fn missing(kinds: &[LossKind]) -> u64 {
     missing.sum()
 }
 
-/// Calls `check` with the records of four logs: with and without ticks, each as a log by itself and as a part.
+/// Calls `check` with the records of four logs: with and without ticks, each as a log of its own and as a part of a
+/// recording.
 fn each(mut check: impl FnMut(&str, Vec<Vec<u8>>)) {
     for (ticks, is_part) in [(true, false), (false, false), (true, true), (false, true)] {
         check(&format!("ticks {ticks}, part {is_part}"), records(&log(ticks, is_part)));
@@ -179,7 +180,7 @@ fn swapped_chunks_are_reported_as_out_of_order() {
     });
 }
 
-/// After the cut the log is closed again, without a summary.
+/// The log is cut between two records and closed again, without a summary.
 #[test]
 fn log_cut_between_records_and_closed_again_is_reported() {
     each(|what, records| {

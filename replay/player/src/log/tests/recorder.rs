@@ -83,8 +83,8 @@ impl Write for Held {
     }
 }
 
-/// Until a sync returns, the unsynced time is the time from the first tick to the last. The unsynced time is zero after
-/// a sync that began after the last tick.
+/// Until the first sync returns, the unsynced time is the time from the first tick to the latest tick. The unsynced
+/// time is zero after a sync that began after the latest tick.
 #[test]
 fn unsynced_time_lasts_from_latest_sync_to_latest_tick() {
     let (go, held) = mpsc::channel();
@@ -383,7 +383,8 @@ fn counts_of_dropped_packets_are_recorded_per_source_every_few_seconds() {
     );
 }
 
-/// While the recorder is too slow, every dropped packet is counted. The source of some dropped packets is then unknown.
+/// While the recorder is too slow, every dropped packet is counted. For some of the dropped packets, the source is then
+/// unknown.
 #[test]
 fn dropped_packets_beyond_the_queue_capacity_are_counted() {
     let (medium, flushed) = slow(0);
@@ -441,7 +442,7 @@ fn derived_messages_are_dropped_before_all_others() {
 
 #[test]
 fn recorder_ends_despite_a_blocked_medium() {
-    /// A medium that accepts the header, and then blocks until the test is over.
+    /// A medium that accepts the header, and then blocks each write until the test is over.
     struct Hanging(usize, mpsc::Receiver<()>);
 
     impl Write for Hanging {

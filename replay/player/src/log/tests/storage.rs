@@ -33,7 +33,7 @@ enum Op {
 /// Decides whether an operation fails, by its kind and number.
 type Plan = Box<dyn FnMut(Op, u64) -> Option<io::Error> + Send>;
 
-/// Content of a file, and the number of its bytes that survive a power cut.
+/// Content of a file, and number of its bytes that are synced, so that they survive a power cut.
 #[derive(Debug, Clone, Default)]
 struct Content {
     bytes: Vec<u8>,
@@ -206,7 +206,7 @@ fn single_storage_fault_is_recorded_and_loses_no_message() {
             let which = format!("{name}, operation {at} of {ops}, {forgets}: {:?}", summary.faults);
             assert_eq!(seen, expected, "{which}");
             assert_eq!(summary.messages, 4 * TICKS, "{which}");
-            // If the next part can't be created, only the rotation fails.
+            // If the next part can't be created, the present part continues, so there is no fault.
             let Some(fault) = summary.faults.first() else {
                 assert!(every.is_some() && losses.is_empty(), "{which}: {losses:?}");
                 continue;
@@ -284,8 +284,8 @@ fn backlog_overflow_loses_and_counts_the_oldest_messages() {
     storage.store(false);
     let (seen, losses) = read_back(&folder);
     assert_eq!(seen.len() as u64, summary.messages);
-    // One gap in the messages is wider than 0.1 s. The log's statement of the loss gives the times at the two ends of
-    // that gap.
+    // The messages have one gap of more than 0.1 s. The loss that the log states must have the times at the two ends of
+    // this gap.
     let times: Vec<u64> = seen.iter().map(|message| message.1).collect();
     let gaps: Vec<_> = times.windows(2).filter(|pair| pair[1] - pair[0] > 100_000_000).collect();
     let stated = losses.iter().find(
@@ -317,8 +317,8 @@ fn synced_messages_survive_a_power_cut_after_an_error() {
         storage.store(true);
         let (seen, losses) = read_back(&folder);
         assert!(expected.starts_with(&seen), "operation {at}");
-        // At most seven steps of a tenth of a second are lost. Half a second lies between two syncs, and the rest is
-        // around the retry.
+        // At most seven steps of a tenth of a second are lost. Five of them lie between two syncs, which are half a
+        // second apart. The others are lost while the recorder retries.
         assert!(seen.len() as u64 >= 4 * (TICKS / 2 - 7), "operation {at}: {}", seen.len());
         assert!(!losses.is_empty(), "operation {at}");
     }

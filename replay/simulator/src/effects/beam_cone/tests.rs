@@ -39,7 +39,7 @@ fn first_return_of_oblique_beam_is_from_its_nearer_edge() {
         let ray = down(angle_rad, 3.0);
         let first_m =
             cone.hits(&tunnel, &ray, 100.0).flatten().map(|hit| hit.range_m).reduce(f64::min).unwrap();
-        // Range of the nearest point of the floor within the cone.
+        // Range of the point of the floor that is nearest within the cone.
         let nearest_m = 3.0 / math::cos((angle_rad - half_rad).max(0.0));
         // If the perpendicular to the floor is within the cone, no ray hits the floor's nearest point exactly, so more
         // error is allowed.

@@ -40,8 +40,8 @@ pub(crate) struct Sonar {
     pub(crate) absorbed_dbpm: f64,
     /// Backscatter of the wall relative to rough rock, dB.
     pub(crate) wall_db: f64,
-    /// Gain at 1 m, dB. `log_gain_db` is the gain per factor of ten in range, dB. `made_up_dbpm` is the one-way
-    /// absorption that the gain compensates, dB/m.
+    /// Gain at 1 m, dB. `log_gain_db` is the gain that each factor of ten in range adds, dB. `made_up_dbpm` is the
+    /// one-way absorption that the gain compensates, dB/m.
     pub(crate) gain_db: f64,
     pub(crate) log_gain_db: f64,
     pub(crate) made_up_dbpm: f64,
@@ -57,7 +57,8 @@ pub(crate) struct Silt {
 }
 
 impl Sonar {
-    /// Probability that a head detects the echo of a wall at `range_m`. `square` is the cosine of incidence.
+    /// Probability that a head detects the echo of a wall at `range_m`. `square` is the cosine of the beam's angle of
+    /// incidence.
     pub(crate) fn detected(&self, range_m: f64, square: f64) -> f64 {
         let echo_db = self.echo_db(range_m.max(0.01), square);
         let noise_db = 10.0 * log10(HEARD_PULSE_S / self.pulse_s);
@@ -92,7 +93,8 @@ impl Sonar {
     }
 }
 
-/// Power of an echo that is just detected at [`HEARD_M`], dB as in [`Sonar::echo_db`].
+/// Power of the echo that is just detected at the range [`HEARD_M`], dB relative to the same reference as in
+/// [`Sonar::echo_db`].
 fn heard_db() -> f64 {
     let wide_m = f64::to_radians(2.4 - (HEARD_AT_KHZ - 600.0) / 400.0) * HEARD_M;
     10.0 * log10(core::f64::consts::FRAC_PI_4 * wide_m * wide_m)

@@ -56,8 +56,8 @@ fn silt_absorption_matches_the_drag_on_its_grains() {
             v = next;
         }
         let power = work / (5.0 * math::TAU / omega);
-        // If the water moves with velocity amplitude 1, the sound's power per area, divided by the water's density, is
-        // c / 2.
+        // If the amplitude of the water's velocity is 1 m/s, the sound's power per area, divided by the water's
+        // density, is c / 2.
         let volume = 1.0 / 2650.0;
         let neper_pm = volume * power / (sound_mps / 2.0) / 2.0;
         let scattering_neper_pm =
@@ -111,7 +111,7 @@ fn detected_share_matches_the_sonar_equation() {
     }
 }
 
-/// Parts of the vehicle are detected even if the wall's echoes are too weak.
+/// Checks that parts of the vehicle are detected even if the wall's echoes are too weak.
 #[test]
 fn echoes_of_vehicle_parts_are_always_detected() {
     let hull = "[[hull]]\nleast_m = [-1, -0.3, -1]\nmost_m = [1, 0.3, -0.5]";

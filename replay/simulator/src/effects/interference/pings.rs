@@ -8,7 +8,7 @@ use crate::effects::geometry::{between_rad, dot};
 use crate::environment::Environment;
 use crate::sensing::Ray;
 
-/// Directions that differ by less than this count as equal, radians.
+/// Difference below which two directions count as equal, radians.
 const SAME_RAD: f64 = 1e-9;
 /// Maximum number of pings extrapolated at once.
 const MOST_FORESEEN: u32 = 16;
@@ -20,7 +20,7 @@ pub(super) struct Ping {
     pub(super) origin: Point3<Tunnel>,
     pub(super) direction: Vec3<Tunnel>,
     pub(super) wall: Option<Point3<Tunnel>>,
-    /// Whether the ping is extrapolated, and its `wall` isn't computed yet.
+    /// Whether the ping is extrapolated, so that its `wall` isn't computed yet.
     foreseen: bool,
 }
 

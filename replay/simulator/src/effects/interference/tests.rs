@@ -15,7 +15,7 @@ fn pair() -> Dive {
     dive
 }
 
-/// Two heads whose pings are not simultaneous.
+/// Two heads that never ping at the same time.
 fn out_of_step() -> Dive {
     let mut dive = pair();
     dive.sensors[1].2 = dive.sensors[1].2.replace("medium", "fastest");

@@ -2,8 +2,7 @@ use headrace_sensor::measurement::{Inertia, Payout, Pressure, Sounding};
 
 use crate::testing_motion::{Bench, same_in_any_slices};
 
-/// Sensors, each with an effect on motion, angles, clocks or lines that changes the sensor's measurements. All such
-/// effects are listed.
+/// All effects on motion, angles, clocks or lines, each with a sensor whose measurements it changes.
 const ALONE: [(&str, &str); 18] = [
     ("head_a", "[effects.start_phase_error]\n"),
     ("head_a", "[effects.sector_end_slowing]\n"),

@@ -44,7 +44,7 @@ fn adding_an_effect_keeps_the_random_numbers_of_other_effects() {
     for effects in [EFFECTS[0], EFFECTS[2], EFFECTS[3], EFFECTS[4]] {
         assert!(alone == outliers(effects, 1), "{effects}");
     }
-    // The scene names the two effects in the wrong order. They run in the program's fixed order all the same.
+    // The scene names the two effects in the wrong order. They still run in the program's fixed order.
     let (a, b) = (EFFECTS[8], EFFECTS[7]);
     assert_eq!(dive.dive(&format!("{a}{b}")).messages, dive.dive(&format!("{b}{a}")).messages);
 }

@@ -15,7 +15,8 @@ fn boulder_is_an_ellipsoid_sunk_into_the_floor() {
     let environment = parse(&text, &CERAN.profile());
     let hit = cast(&environment, [10.0, 0.0, 5.0], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (5.0 - 0.6)).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Rays at the height of the boulder's centre, 0.2 m above the floor: one along the tunnel, one from the side.
+    // The rays are at the height of the boulder's centre, 0.2 m above the floor. One runs along the tunnel, the other
+    // comes from the side.
     let hit = cast(&environment, [5.0, 0.0, 0.2], [1.0, 0.0, 0.0]).unwrap();
     assert!((hit.range_m - 4.0).abs() < 1e-12 && (hit.normal.x() + 1.0).abs() < 1e-12, "{hit:?}");
     let hit = cast(&environment, [10.0, 4.0, 0.2], [0.0, -1.0, 0.0]).unwrap();
@@ -56,8 +57,8 @@ fn side_tunnel_has_the_given_length() {
     let environment = parse(&feature("side_tunnel", keys), &shapes::rectangle(8.0, 5.0).unwrap());
     let hit = cast(&environment, [10.0, -1.0, 2.0], [0.0, 1.0, 0.0]).unwrap();
     assert!((hit.range_m - 35.0).abs() < 1e-12 && hit.what == What::Feature(0), "{hit:?}");
-    // Ranges from a point inside the side tunnel, first to the opposite wall of the main tunnel and then to a side wall
-    // of the side tunnel.
+    // The rays start inside the side tunnel. The first one hits the opposite wall of the main tunnel, the second one a
+    // side wall of the side tunnel.
     let back = cast(&environment, [10.5, 30.0, 2.0], [0.0, -1.0, 0.0]).unwrap();
     assert!((back.range_m - 34.0).abs() < 1e-12 && back.what == What::Wall, "{back:?}");
     let side = cast(&environment, [10.5, 30.0, 2.0], [1.0, 0.0, 0.0]).unwrap();

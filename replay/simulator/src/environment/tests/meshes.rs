@@ -240,7 +240,7 @@ fn box_of_triangles_equals_a_solid_block() {
         let Some(hit) = hit else { continue };
         let wall_m = cast(&bare, ray.origin, ray.direction).map_or(f64::INFINITY, |hit| hit.range_m);
         let wanted_m = block.meet(&ray).map_or(wall_m, |(t_m, _)| t_m.min(wall_m));
-        // Only a ray that runs along a side of the box may hit or miss it.
+        // The two methods may differ only for a ray that runs along a side of the box.
         assert!((hit.range_m - wanted_m).abs() < 1e-9, "{ray:?} {hit:?} {wanted_m}");
         met += usize::from(hit.what == What::Feature(0));
     }

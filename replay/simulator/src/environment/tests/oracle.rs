@@ -286,12 +286,12 @@ impl Oracle {
     }
 }
 
-/// Tests whether a point of a straight tunnel is in a box with sides along the axes.
+/// Returns a function that tests whether a point of a straight tunnel is in a box with sides along the axes.
 pub(super) fn upright(least: V3, most: V3) -> Test {
     Box::new(move |p, _| (0..3).all(|k| (least[k]..=most[k]).contains(&p[k])))
 }
 
-/// Tests whether a point is in an ellipsoid with its axes along x, y and z.
+/// Returns a function that tests whether a point is in an ellipsoid with its axes along x, y and z.
 pub(super) fn ellipsoid(centre: V3, half: V3) -> Test {
     Box::new(move |p, _| {
         (0..3).map(|k| (p[k] - centre[k]) * (p[k] - centre[k]) / half[k] / half[k]).sum::<f64>() < 1.0

@@ -65,8 +65,8 @@ fn bulge(b: &[f64; 5]) -> String {
 fn bulges_displace_the_wall() {
     for (seed, shape) in [(6, CERAN), (7, Shape::Rectangle(9.0, 4.0)), (8, Shape::Circle(3.0))] {
         let mut oracle = Oracle::new(shape);
-        // Bulges that point inwards, that point outwards, that lie across the floor's centre, where the arc length
-        // jumps from p to 0, that overlap, or that are thin.
+        // The bulges point inwards or outwards, lie across the floor's centre, where the arc length jumps from p to 0,
+        // overlap each other, or are thin.
         oracle.bulges = vec![
             [10.0, 4.0, 9.0, 3.0, 1.0],
             [13.0, 6.0, 11.0, 6.0, -2.0],
@@ -86,7 +86,7 @@ fn rays_do_not_skip_a_thin_bulge() {
     let centre = environment.design.reference();
     let hit = cast(&environment, [10.0, centre[0], centre[1]], [0.0, 0.0, -1.0]).unwrap();
     assert!((hit.range_m - (centre[1] - 0.02)).abs() < 1e-9 && hit.what == What::Feature(0), "{hit:?}");
-    // Rays along the floor, through the middle of the bulge and over its top.
+    // The rays run along the floor, through the middle of the bulge, and over its top.
     let low = cast(&environment, [5.0, 0.0, 0.01], [1.0, 0.0, 0.0]).unwrap();
     assert!((low.range_m - 4.995).abs() < 1e-9 && low.what == What::Feature(0), "{low:?}");
     assert!(cast(&environment, [5.0, 0.0, 0.0201], [1.0, 0.0, 0.0]).is_none());
