@@ -25,7 +25,7 @@ use value_parsers::{
 };
 
 pub(crate) use common_options::{Completions, Man, Overwrite, Threads};
-pub(crate) use logs::{Deliver, Export, Import, Notes, Recover, Trim, Verify};
+pub(crate) use logs::{Deliver, Dives, Export, Import, Notes, Recover, Trim, Verify};
 pub(crate) use page::PageArgs;
 pub(crate) use setup::{GivenPort, Setup, mount};
 pub(crate) use value_parsers::{Speed, length, speed, target, time};
@@ -148,6 +148,12 @@ pub(crate) enum Command {
         after_help = "Example:\n  headrace deliver dive.mcap -o report --about about.toml\n  headrace deliver dive.mcap -o report --plant Ceran --crew 'A. Berg' --every 5"
     )]
     Deliver(Deliver),
+    /// List the dives that are recorded in a folder, with the metres by verdict of their reports.
+    ///
+    /// Logs aren't replayed. Interrupted dives and dives without a report are named, with the command that
+    /// continues the dive or makes the report. Exit code 3 if a log can't be read.
+    #[command(after_help = "Example:\n  headrace dives\n  headrace dives /var/lib/headrace --json")]
+    Dives(Dives),
     /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
     ///
     /// The log isn't replayed: places are those that the dive published. Exit code 3 if a part of the log or

@@ -8,6 +8,7 @@ mod cli;
 mod commands;
 mod deliver;
 mod dive;
+mod dives;
 mod emulate;
 mod expect;
 mod explain;
@@ -90,6 +91,7 @@ pub fn main() -> ExitCode {
         Command::Replay(replay) => commands::replay(&replay),
         Command::Export(args) => export::export(&args),
         Command::Deliver(args) => deliver::deliver(&args),
+        Command::Dives(args) => dives::dives(&args),
         Command::Notes(args) => notes::notes(&args),
         Command::Verify(args) => verify::verify(&args),
         Command::Recover(args) => recover::recover(&args),

@@ -50,7 +50,7 @@ pub(crate) struct Deliver {
     /// Member of the crew. Give it once per member.
     #[arg(long, value_name = "NAME")]
     pub(crate) crew: Vec<String>,
-    /// Distance between the report's cross-sections, metres. The default gives at most 24 of them.
+    /// Distance between the report's cross-sections, metres. The default gives at most 24 of them; at most 2,000 are allowed.
     #[arg(long, value_name = "METRES", value_parser = length)]
     pub(crate) every: Option<f64>,
     /// Vehicle file, overriding the one attached to the log.
@@ -75,6 +75,16 @@ pub(crate) struct Notes {
     pub(crate) json: bool,
     #[command(flatten)]
     pub(crate) overwrite: Overwrite,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct Dives {
+    /// Folder of recordings and their reports.
+    #[arg(default_value = ".", value_name = "FOLDER")]
+    pub(crate) folder: PathBuf,
+    /// Print JSON.
+    #[arg(long)]
+    pub(crate) json: bool,
 }
 
 #[derive(Debug, Args)]

@@ -109,7 +109,8 @@ fn every_sabotage_breaks_an_invariant() {
 #[test]
 fn blocked_terminal_does_not_change_results() {
     for seed in 0..20 {
-        let [taken, stood] = [false, true].map(|is_open| World::new(seed).with_terminal(is_open).live());
+        let [taken, stood] =
+            [false, true].map(|is_blocked| World::new(seed).with_terminal(is_blocked).live());
         assert_eq!((taken.digest, &taken.consumed), (stood.digest, &stood.consumed), "seed {seed}");
         let bytes = |lived: &DiveResult| lived.left.iter().map(|file| file.bytes.len()).sum::<usize>();
         assert_eq!(bytes(&taken), bytes(&stood), "seed {seed}");

@@ -220,11 +220,11 @@ impl World {
         }
     }
 
-    /// The same world with another terminal. The terminal accepts nothing if `is_open` is set, and everything
+    /// The same world with another terminal. The terminal accepts nothing if `is_blocked` is set, and everything
     /// otherwise.
     #[must_use]
-    pub fn with_terminal(mut self, is_open: bool) -> Self {
-        self.plan = self.plan.with_terminal(is_open);
+    pub fn with_terminal(mut self, is_blocked: bool) -> Self {
+        self.plan = self.plan.with_terminal(is_blocked);
         self
     }
 

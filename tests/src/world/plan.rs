@@ -276,12 +276,13 @@ impl Plan {
         plan
     }
 
-    /// The same plan with another terminal. The terminal accepts nothing if `is_open` is set, and everything otherwise.
+    /// The same plan with another terminal. The terminal accepts nothing if `is_blocked` is set, and everything
+    /// otherwise.
     #[must_use]
-    pub fn with_terminal(mut self, is_open: bool) -> Self {
+    pub fn with_terminal(mut self, is_blocked: bool) -> Self {
         self.machine.retain(|window| window.what != MachineFault::TerminalStands);
         let always = Window { what: MachineFault::TerminalStands, from: BEGIN, to: MonoNs(u64::MAX) };
-        self.machine.extend(is_open.then_some(always));
+        self.machine.extend(is_blocked.then_some(always));
         self
     }
 

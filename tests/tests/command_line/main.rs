@@ -8,6 +8,7 @@ mod check;
 mod conventions;
 mod deliver;
 mod deliver_files;
+mod dives;
 mod go_back_advice;
 mod logging;
 mod mavlink_out;
