@@ -159,8 +159,8 @@ pub(crate) struct Import {
     /// it once per sensor; it replaces the assignment by the vehicle file.
     #[arg(long, value_name = "ID=STREAM", value_parser = source_line)]
     pub(crate) source: Vec<(String, String)>,
-    /// Mapping file. For CSV it maps columns to quantities of sensors; for ROS, topics to sensors if they are
-    /// ambiguous.
+    /// Mapping file. For CSV it maps columns to quantities of sensors, and to their confidence, validity, status
+    /// or variance; for ROS, topics to sensors if they are ambiguous.
     #[arg(long, value_name = "MAPPING.toml")]
     pub(crate) map: Option<PathBuf>,
     /// Format of the file, if its extension doesn't show it.

@@ -90,13 +90,14 @@ impl FileKind {
         }
     }
 
-    /// Returns the format of this kind of file; `None` if the format needs a vehicle file or a mapping.
-    pub fn format(self) -> Option<Box<dyn Format>> {
+    /// Returns the format of this kind of file; `None` if the format needs a vehicle file or a mapping. The name of the
+    /// file may give the time at which it starts.
+    pub fn format(self, file_name: &str) -> Option<Box<dyn Format>> {
         match self {
             Self::Tlog => Some(Box::<TlogFormat>::default()),
             Self::Candump => Some(Box::new(Candump)),
             Self::Imagenex => Some(Box::new(ImagenexFormat)),
-            Self::Ping => Some(Box::<PingFormat>::default()),
+            Self::Ping => Some(Box::new(PingFormat::new(file_name))),
             Self::Csv | Self::Rosbag | Self::Mcap => None,
         }
     }

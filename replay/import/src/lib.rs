@@ -9,6 +9,7 @@
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
+mod calendar;
 pub mod candump;
 pub mod csv;
 pub mod detect;
