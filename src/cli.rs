@@ -180,8 +180,8 @@ pub(crate) enum Command {
     /// the scene, those that the scene calls for are added. --explain lists them.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
-    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and
-    /// MCAP.
+    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, A50, CSV, ROS
+    /// bags and MCAP.
     ///
     /// Each message goes to the sensors of the vehicle file that would have received it. The vehicle file is
     /// attached to the log. Readings that the file marks as doubtful are withheld if the sensor's messages can't

@@ -208,8 +208,8 @@ fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     kind.map_or_else(
         || {
             let problem = "the file name doesn't show the format; expected .tlog, .log (candump), .852, .81a, .81b, \
-                 .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
-                 for another name, give --format tlog|candump|imagenex|ping|csv|rosbag|mcap";
+                 .81s, .31l (imagenex), .bin (ping), .json, .jsonl (a50), .csv, .bag (rosbag) and .mcap (of ROS); \
+                 for another name, give --format tlog|candump|imagenex|ping|a50|csv|rosbag|mcap";
             Err(named(path, &format!("importing {}: {problem}", path.display())))
         },
         Ok,

@@ -84,8 +84,9 @@ fn doubtful_rows_of_a_table_are_withheld_by_the_import_or_by_the_replay() {
 fn table_with_the_points_of_echoes_is_refused_before_the_import() {
     let folder =
         folder(&[("a", "sonar", "angle", "unit = \"deg\""), ("r", "sonar", "range", "unit = \"m\"")]);
-    let points: String =
-        (1..400).map(|bin| format!("2026-05-04T12:00:00Z,30,{}\n", f64::from(bin) / 50.0)).collect();
+    let points = (1..400).fold(String::new(), |rows, bin| {
+        format!("{rows}2026-05-04T12:00:00Z,30,{}\n", f64::from(bin) / 50.0)
+    });
     folder.write("table.csv", format!("t,a,r\n{points}"));
     let answer = import(&folder, &["table.csv", "--map", "map.toml"]);
     assert_eq!(answer.code, Some(2), "{}", answer.stderr);
@@ -132,4 +133,24 @@ fn ping_viewer_log_needs_a_ping_echosounder_and_has_the_local_time_of_its_name()
         (metadata["import_clock"].as_str(), metadata["import_clock_first_ns"].as_str()),
         ("local", "1700000001750000000")
     );
+}
+
+#[test]
+fn lines_of_an_a50_become_its_readings_with_their_validity() {
+    let folder = folder(&[]);
+    let line = |number: u32, valid: bool| {
+        let (vx, at_us) = (f64::from(number) / 10.0, 1_700_000_000_000_000 + u64::from(number) * 200_000);
+        format!(
+            "{{\"vx\":{vx},\"vy\":0.01,\"vz\":0.0,\"fom\":0.002,\"altitude\":1.5,\"transducers\":[{{\"beam_valid\":true}},\
+             {{\"beam_valid\":true}},{{\"beam_valid\":true}}],\"velocity_valid\":{valid},\"status\":0,\"type\":\"velocity\",\
+             \"format\":\"json_v3.1\",\"time_of_validity\":{at_us},\"time_of_transmission\":{}}}\r\n",
+            at_us + 100_000
+        )
+    };
+    folder.write("dvl.jsonl", [line(1, true), line(2, false), line(3, true)].concat());
+    let answer = import(&folder, &["dvl.jsonl"]);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let (_, report) = folder.replay("out.mcap", &[]);
+    let source = &report["sources"][0];
+    assert_eq!((&source["frames"], &source["withheld"]), (&3.into(), &1.into()), "{source}");
 }

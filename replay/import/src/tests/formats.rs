@@ -16,7 +16,7 @@ use crate::{Entry, Format, Step};
 
 /// Splits a file by a format. Returns the entries, the lengths of the losses with their reasons, and the number of
 /// bytes left at the end of the file.
-pub(super) fn cut(
+pub(crate) fn cut(
     format: &mut dyn Format,
     mut file: &[u8],
 ) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {

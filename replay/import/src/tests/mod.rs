@@ -1,5 +1,5 @@
 //! Tests of the import and of the formats, on constructed files.
 
 mod doubt;
-mod formats;
+pub(crate) mod formats;
 mod machinery;
