@@ -186,11 +186,12 @@ pub(crate) enum Command {
     /// the scene, those that the scene calls for are added. --explain lists them.
     #[command(after_help = SIMULATE_EXAMPLES)]
     Simulate(Simulate),
-    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, CSV, ROS bags and
-    /// MCAP.
+    /// Convert a log of another program: MAVLink telemetry, candump, Imagenex, Ping Viewer, A50, CSV, ROS
+    /// bags and MCAP.
     ///
     /// Each message goes to the sensors of the vehicle file that would have received it. The vehicle file is
-    /// attached to the log. Exit code 3 if part of the file was lost, 1 if no sensor receives any message.
+    /// attached to the log. Readings that the file marks as doubtful are withheld if the sensor's messages can't
+    /// state the doubt. Exit code 3 if part of the file was lost or withheld, 1 if no sensor receives any message.
     #[command(after_help = IMPORT_EXAMPLES)]
     Import(Import),
     /// Plan an inspection: sample spacing, speed and hours by mode, for a tunnel, heads, layout and target.

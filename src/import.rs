@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, Read, Seek, SeekFrom};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::iter;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -100,8 +100,7 @@ fn write<S: Source>(
     let import = Import::of(input, kind.entries()).map_err(|error| unusable(&args.file, error))?;
     header.metadata.extend(import.clock_metadata());
     header.metadata.insert(IMPORTED.to_owned(), kind.name().to_owned());
-    let file_name = args.file.file_name().map(|name| name.to_string_lossy().into_owned());
-    header.metadata.insert("import_file".to_owned(), file_name.unwrap_or_default());
+    header.metadata.insert("import_file".to_owned(), file_name(&args.file));
     let ids: Vec<String> = header.sources.iter().map(|source| source.id.clone()).collect();
     let failed = |source| Failure::Write { path: args.output.clone(), source };
     let mut log = LogWriter::new(AtomicFile::create(&args.output).map_err(failed)?, &header)
@@ -127,7 +126,7 @@ fn format(
                     other than CSV and ROS refuse it";
         return Err(Failure::Usage(what.to_owned()));
     }
-    if let Some(format) = kind.format() {
+    if let Some(format) = kind.format(&file_name(&args.file)) {
         return Ok(format);
     }
     if kind != FileKind::Csv {
@@ -141,17 +140,13 @@ fn format(
         return Err(Failure::Usage(what.to_owned()));
     };
     let (text, name) = (files::read(map)?, map.display().to_string());
-    let header = first_line(&args.file)?;
-    Ok(Box::new(Document::new(&name, &text).read(|mapping| Csv::new(mapping, vehicle, &header))?))
+    let front = String::from_utf8_lossy(&front_of(&args.file, 1 << 16)?).into_owned();
+    Ok(Box::new(Document::new(&name, &text).read(|mapping| Csv::new(mapping, vehicle, &front))?))
 }
 
-/// First line of a file, up to 64 KiB.
-fn first_line(path: &Path) -> Result<String, Failure> {
-    let failed = |source| Failure::Read { path: path.to_owned(), source };
-    let file = BufReader::new(files::open(path)?);
-    let mut line = Vec::new();
-    file.take(1 << 16).read_until(b'\n', &mut line).map_err(failed)?;
-    Ok(String::from_utf8_lossy(&line).into_owned())
+/// Name of a file without its folder.
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 /// Prints a summary; returns the exit code.
@@ -205,14 +200,16 @@ fn tell(args: &cli::Import, kind: FileKind, ids: &[String], imported: &Imported)
 /// other check.
 fn kind_of(path: &Path) -> Result<FileKind, Failure> {
     let kind = FileKind::of(path);
-    if kind == Some(FileKind::Ping) && front_of(path)?.starts_with(&detect::DATAFLASH) {
+    if kind == Some(FileKind::Ping)
+        && front_of(path, detect::ENOUGH_BYTES as u64)?.starts_with(&detect::DATAFLASH)
+    {
         return Err(named(path, &format!("importing {}: not a Ping Viewer log", path.display())));
     }
     kind.map_or_else(
         || {
             let problem = "the file name doesn't show the format; expected .tlog, .log (candump), .852, .81a, .81b, \
-                 .81s, .31l (imagenex), .bin (ping), .csv, .bag (rosbag) and .mcap (of ROS); \
-                 for another name, give --format tlog|candump|imagenex|ping|csv|rosbag|mcap";
+                 .81s, .31l (imagenex), .bin (ping), .json, .jsonl (a50), .csv, .bag (rosbag) and .mcap (of ROS); \
+                 for another name, give --format tlog|candump|imagenex|ping|a50|csv|rosbag|mcap";
             Err(named(path, &format!("importing {}: {problem}", path.display())))
         },
         Ok,
@@ -233,7 +230,7 @@ fn unusable(path: &Path, error: ImportError) -> Failure {
 
 /// Error for a file of the wrong kind. The text names the kind of file that it seems to be.
 fn named(path: &Path, problem: &str) -> Failure {
-    let front = match front_of(path) {
+    let front = match front_of(path, detect::ENOUGH_BYTES as u64) {
         Ok(front) => front,
         Err(failure) => return failure,
     };
@@ -241,10 +238,10 @@ fn named(path: &Path, problem: &str) -> Failure {
     Failure::Usage(format!("{problem}{}", looks.unwrap_or_default()))
 }
 
-/// The first bytes of a file.
-fn front_of(path: &Path) -> Result<Vec<u8>, Failure> {
+/// The first bytes of a file, at most `bytes`.
+fn front_of(path: &Path, bytes: u64) -> Result<Vec<u8>, Failure> {
     let mut front = Vec::new();
-    let mut file = files::open(path)?.take(detect::ENOUGH_BYTES as u64);
+    let mut file = files::open(path)?.take(bytes);
     file.read_to_end(&mut front).map_err(|source| Failure::Read { path: path.to_owned(), source })?;
     Ok(front)
 }

@@ -165,12 +165,12 @@ pub(crate) struct Import {
     /// Vehicle file with the sensors that the messages come from.
     #[arg(long, value_name = "VEHICLE.toml")]
     pub(crate) vehicle: Option<PathBuf>,
-    /// Sensor, and the stream of the log that it receives (mavlink, imagenex, ping, or a CAN interface). Give
-    /// it once per sensor; it replaces the assignment by the vehicle file.
+    /// Sensor, and the stream of the log that it receives (mavlink, imagenex, ping, a50, or a CAN interface).
+    /// Give it once per sensor; it replaces the assignment by the vehicle file.
     #[arg(long, value_name = "ID=STREAM", value_parser = source_line)]
     pub(crate) source: Vec<(String, String)>,
-    /// Mapping file. For CSV it maps columns to quantities of sensors; for ROS, topics to sensors if they are
-    /// ambiguous.
+    /// Mapping file. For CSV it maps columns to quantities of sensors, and to their confidence, validity, status
+    /// or variance; for ROS, topics to sensors if they are ambiguous.
     #[arg(long, value_name = "MAPPING.toml")]
     pub(crate) map: Option<PathBuf>,
     /// Format of the file, if its extension doesn't show it.

@@ -27,6 +27,8 @@ pub struct Sounding {
     pub reported_rad: f64,
     /// Range in water at the site's speed of sound, m; `None` without an echo.
     pub range_m: Option<f64>,
+    /// Confidence of an echosounder in the range, 0 to 1; unused for a profiling head.
+    pub confidence: f64,
 }
 
 /// Simulated water pressure at a depth sensor.
@@ -60,6 +62,12 @@ pub struct GroundVelocity {
     pub at: MonoNs,
     /// Velocity of the sensor itself, m/s. It includes the motion by the vehicle's rotation.
     pub velocity_mps: Vec3<Sensor>,
+    /// Figure of merit: standard deviation of the velocity, m/s; `None` for the device's usual value.
+    pub fom_mps: Option<f64>,
+    /// Whether the device marks the velocity as valid.
+    pub is_valid: bool,
+    /// Status of the device; 0 without a fault.
+    pub status: u8,
 }
 
 /// Simulated length of cable paid out into the tunnel.
@@ -88,9 +96,9 @@ macro_rules! measurement {
 measurement!(Sounding, Pressure, Inertia, GroundVelocity, Payout);
 
 impl Sounding {
-    /// Creates a scheduled ping that has no echo yet.
+    /// Creates a scheduled ping that has no echo yet. An echo is certain unless the confidence is reduced.
     pub fn due(at: MonoNs, angle_rad: f64) -> Self {
-        Self { at, angle_rad, reported_rad: angle_rad, range_m: None }
+        Self { at, angle_rad, reported_rad: angle_rad, range_m: None, confidence: 1.0 }
     }
 }
 
@@ -112,7 +120,7 @@ impl Inertia {
 impl GroundVelocity {
     /// Creates a scheduled measurement that has no value yet.
     pub fn due(at: MonoNs) -> Self {
-        Self { at, velocity_mps: Vec3::zero() }
+        Self { at, velocity_mps: Vec3::zero(), fom_mps: None, is_valid: true, status: 0 }
     }
 }
 

@@ -61,6 +61,14 @@ impl NavigationConfig {
         Ok(if by_filter { Self::Filter(settings) } else { Self::Direct })
     }
 
+    /// Returns the settings of the filter. Direct navigation has none, so its settings are the defaults.
+    pub fn settings(&self) -> Settings {
+        match self {
+            Self::Filter(settings) => *settings,
+            Self::Direct => Settings::default(),
+        }
+    }
+
     /// Creates the navigation with its initial state.
     pub fn begin(&self, profile: &Profile, site: Site) -> Box<dyn Navigation> {
         match self {

@@ -57,15 +57,16 @@ impl Emulator<GroundVelocity> for A50Emulator {
         // In device axes, y and z have the opposite sign of headrace's y and z.
         let [x, y, z] = moved.velocity_mps.0.into();
         let at_us = BEGINS_US + moved.at.since(self.start).0 / 1000;
-        let [even, odd] = FOMS_MPS;
+        // Imported figures of merit may be equal, too. The next float is a different one, and its value is the same.
+        let [even, odd] = moved.fom_mps.map_or(FOMS_MPS, |fom_mps| [fom_mps, fom_mps.next_up()]);
         let report = Velocity {
             against: Against::Bottom,
             velocity_mps: [x, -y, -z],
             fom_mps: if self.sent.is_multiple_of(2) { even } else { odd },
             altitude_m: ALTITUDE_M,
             valid_beams: 4,
-            is_valid: true,
-            status: 0,
+            is_valid: moved.is_valid,
+            status: moved.status,
             times_us: Some([at_us, at_us + DELAY_US]),
         };
         self.sent += 1;

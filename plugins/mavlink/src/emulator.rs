@@ -17,8 +17,7 @@ use mavlink::dialects::ardupilotmega::{
 /// Least and greatest distance of an emulated distance sensor, cm: about the limits of a Ping1D.
 const LEAST_CM: u16 = 30;
 const MOST_CM: u16 = 5000;
-/// Qualities of distances with and without an echo, per cent.
-const QUALITY_HEARD_PERCENT: u8 = 100;
+/// Quality of an invalid distance, per cent. Source: MAVLink, `DISTANCE_SENSOR`. A quality of 0 is unknown.
 const QUALITY_INVALID_PERCENT: u8 = 1;
 /// Period of heartbeats. Source: MAVLink, heartbeat protocol, once a second.
 const HEARTBEAT_PERIOD: DurNs = DurNs::from_millis(1_000);
@@ -151,6 +150,8 @@ impl Emulator<Sounding> for AutopilotEmulator {
         let Part::Distance(DistancePart { orientation, sensor_id, .. }) = self.meaning.part else { return };
         let cm = sounding.range_m.map(|range_m| math::round_to_i64(range_m * self.device_per_site * 100.0));
         let heard = cm.and_then(|cm| u16::try_from(cm).ok()).filter(|cm| (LEAST_CM..=MOST_CM).contains(cm));
+        let quality_percent = u8::try_from(math::round_to_i64(sounding.confidence * 100.0)).ok();
+        let quality_percent = quality_percent.filter(|_| heard.is_some()).unwrap_or(0);
         let distance = Distance {
             time_boot_ms: self.since_boot_ms(sounding.at),
             least_cm: LEAST_CM,
@@ -158,7 +159,7 @@ impl Emulator<Sounding> for AutopilotEmulator {
             distance_cm: heard.unwrap_or(0),
             sensor_id: sensor_id.unwrap_or(0),
             orientation: orientation.unwrap_or(0),
-            quality_percent: if heard.is_some() { QUALITY_HEARD_PERCENT } else { QUALITY_INVALID_PERCENT },
+            quality_percent: quality_percent.max(QUALITY_INVALID_PERCENT),
         };
         self.send(sounding.at, &Message::Distance(distance), line);
     }

@@ -118,11 +118,13 @@ impl PingEmulator {
     }
 
     /// Encodes a ping as the message with this id.
-    fn distance_message(&mut self, about: u16, distance_mm: Option<u32>) -> Message {
+    fn distance_message(&mut self, about: u16, distance_mm: Option<u32>, confidence: f64) -> Message {
         self.pings = self.pings.wrapping_add(1);
+        let confidence = math::round_to_i64(confidence * 100.0);
+        let confidence = u8::try_from(confidence).ok().filter(|_| distance_mm.is_some()).unwrap_or(0);
         let distance = Distance {
             distance_mm: distance_mm.unwrap_or(0),
-            confidence_percent: if distance_mm.is_some() { 100 } else { 0 },
+            confidence_percent: confidence.into(),
             pulse_us: PULSE_US,
             ping_number: self.pings,
             scan: SCAN,
@@ -131,7 +133,7 @@ impl PingEmulator {
         match about {
             id::DISTANCE_SIMPLE => Message::DistanceSimple(DistanceSimple {
                 distance_mm: distance.distance_mm,
-                confidence_percent: if distance_mm.is_some() { 100 } else { 0 },
+                confidence_percent: confidence,
             }),
             id::PROFILE => Message::Profile(Profile { distance, strengths: strengths(distance_mm) }),
             _ => Message::Distance(distance),
@@ -200,7 +202,7 @@ impl Emulator<Sounding> for PingEmulator {
             }
         }
         let distance_mm = self.distance_mm(sounding.range_m);
-        let message = self.distance_message(about, distance_mm);
+        let message = self.distance_message(about, distance_mm, sounding.confidence);
         self.say(sounding.at, &message, line);
     }
 }

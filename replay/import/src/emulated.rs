@@ -3,6 +3,8 @@
 
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::{Rot, Sensor, Vec3};
+use headrace_geometry::math;
+use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_sampling::head::HeadProgram;
 use headrace_sensor::device::{Device, Direction, Emulated, EmulatorSetup, Sense};
@@ -51,6 +53,40 @@ impl Value {
     }
 }
 
+/// Doubt that a foreign log states about a value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Doubt {
+    /// Confidence in a range, 0 to 1.
+    pub(super) confidence: f64,
+    /// Variance of the value, in the square of its SI unit; 0 if it isn't stated.
+    pub(super) variance: f64,
+    /// Whether the value is marked as valid.
+    pub(super) is_valid: bool,
+    /// Status of the device; 0 without a fault.
+    pub(super) status: u8,
+}
+
+impl Doubt {
+    /// No doubt is stated.
+    pub(super) const NONE: Self = Self { confidence: 1.0, variance: 0.0, is_valid: true, status: 0 };
+}
+
+/// Reason why a value isn't encoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unsent {
+    /// The value is impossible, or the sensor can't encode it.
+    Unencodable,
+    /// The log states a doubt, as text, for which the sensor's messages have no field.
+    Doubtful(&'static str),
+}
+
+/// Loss of readings whose variance exceeds the noise that navigation assumes.
+pub(super) const TOO_UNCERTAIN: &str =
+    "readings whose variance exceeds the noise in [navigation] of the vehicle file, withheld";
+
+/// Least confidence of a range that a head reports as certain. The same limit is the default of echosounders.
+const LEAST_CONFIDENCE: f64 = 0.5;
+
 /// Remark in the import's report, for ranges outside a head's range setting.
 pub(super) const BEYOND: &str = "ranges outside the head's range setting, imported as pings without an echo";
 
@@ -60,6 +96,12 @@ pub(super) struct EmulatedSensor {
     pub(super) sense: Sense,
     /// For a head, least and greatest measurable range, m, at the site's speed of sound.
     reach_m: Option<[f64; 2]>,
+    /// Properties of the water, which convert values to those that the sensor measures.
+    pub(super) site: Site,
+    /// Noise variance that the vehicle file states for the sensor, in the square of the SI unit.
+    usual_variance: f64,
+    /// Largest variances of heading, turn rate and specific force of an inertial unit with a use for navigation.
+    inertial_variances: [f64; 3],
     emulated: Emulated,
 }
 
@@ -97,8 +139,62 @@ impl EmulatedSensor {
             site: vehicle.site,
             polled: true,
         };
-        let reach_m = head.map(|head| head.reach_m(vehicle.site.sound_speed_mps));
-        Self { id: id.to_owned(), sense: device.sense(), reach_m, emulated: device.emulator(&setup) }
+        let site = vehicle.site;
+        let navigation = vehicle.navigation.settings();
+        let declared = navigation.usual_variance(device.specification().kind);
+        let pa_per_m = site.density_kgpm3 * site.gravity_mps2;
+        let deviation = navigation.heading.reach;
+        // Data with more noise than the filter assumes without them are of no use.
+        let useless = |density: f64| density * density / PERIOD.as_secs_f64();
+        Self {
+            id: id.to_owned(),
+            sense: device.sense(),
+            reach_m: head.map(|head| head.reach_m(site.sound_speed_mps)),
+            site,
+            // The noise of a depth sensor is declared in metres.
+            usual_variance: declared * if device.sense() == Sense::Depth { pa_per_m * pa_per_m } else { 1.0 },
+            inertial_variances: [
+                navigation.heading_sd_rad * navigation.heading_sd_rad + deviation * deviation,
+                useless(navigation.blind_rate_noise),
+                useless(navigation.blind_force_noise),
+            ],
+            emulated: device.emulator(&setup),
+        }
+    }
+
+    /// Returns whether orientation, turn rate and specific force of an inertial unit have variances that their messages
+    /// need not state. `variances` are those of tilt, heading, turn rate and specific force.
+    pub(super) fn are_certain(&self, [tilt, heading, rate, force]: [f64; 4]) -> [bool; 3] {
+        let [most_heading, most_rate, most_force] = self.inertial_variances;
+        [tilt <= self.usual_variance && heading <= most_heading, rate <= most_rate, force <= most_force]
+    }
+
+    /// Returns the doubt about a value for which the sensor's messages have no field, as text.
+    fn doubt_without_field(&self, doubt: &Doubt) -> Option<&'static str> {
+        let has_confidence = matches!(self.emulated, Emulated::Echosounder(_));
+        if matches!(self.emulated, Emulated::VelocityLog(_)) {
+            None
+        } else if !doubt.is_valid {
+            Some("readings marked as invalid, withheld: the sensor's messages have no field for this")
+        } else if doubt.status != 0 {
+            Some("readings with a status other than 0, withheld: the sensor's messages have no field for it")
+        } else if !has_confidence && doubt.confidence < LEAST_CONFIDENCE {
+            Some(
+                "readings with a confidence below 50 %, withheld: the sensor's messages have no field for it",
+            )
+        } else if doubt.variance <= self.usual_variance {
+            None
+        } else {
+            Some(TOO_UNCERTAIN)
+        }
+    }
+
+    /// Remark on ranges for which the recording's speed of sound isn't stated.
+    pub(super) fn assumed_speed(&self) -> String {
+        let (id, mps) = (&self.id, self.site.sound_speed_mps);
+        format!(
+            "ranges of {id} count as computed with the speed of sound of the site, {mps} m/s; if the device used another, set `sound_speed_mps` in the mapping"
+        )
     }
 
     /// Whether the sensor is a head.
@@ -122,10 +218,19 @@ impl EmulatedSensor {
 
     /// Emits the bytes that the sensor would have sent, with their receive times.
     ///
-    /// Returns `false` if the value is impossible, or the sensor can't encode it.
-    pub(super) fn tell(&mut self, at: MonoNs, value: &Value, sink: &mut dyn FnMut(MonoNs, &[u8])) -> bool {
+    /// Errors: the value is impossible, the sensor can't encode it, or its messages have no field for its doubt.
+    pub(super) fn tell(
+        &mut self,
+        at: MonoNs,
+        value: &Value,
+        doubt: &Doubt,
+        sink: &mut dyn FnMut(MonoNs, &[u8]),
+    ) -> Result<(), Unsent> {
+        if let Some(why) = self.doubt_without_field(doubt) {
+            return Err(Unsent::Doubtful(why));
+        }
         if !value.is_possible() {
-            return false;
+            return Err(Unsent::Unencodable);
         }
         let mut is_sent = false;
         let mut line = |direction, at: MonoNs, bytes: &[u8]| {
@@ -140,7 +245,8 @@ impl EmulatedSensor {
                 device.tell(&Sounding { range_m, ..Sounding::due(at, angle_rad) }, &mut line);
             }
             (Emulated::Echosounder(device), Value::Range(range_m)) => {
-                device.tell(&Sounding { range_m, ..Sounding::due(at, 0.0) }, &mut line);
+                let confidence = doubt.confidence;
+                device.tell(&Sounding { range_m, confidence, ..Sounding::due(at, 0.0) }, &mut line);
             }
             (Emulated::Depth(device), Value::Pressure(pressure_pa)) => {
                 device.tell(&Pressure { at, pressure_pa }, &mut line);
@@ -151,13 +257,21 @@ impl EmulatedSensor {
                 device.tell(&motion, &mut line);
             }
             (Emulated::VelocityLog(device), Value::Velocity(velocity)) => {
-                device.tell(&GroundVelocity { at, velocity_mps: vector(velocity) }, &mut line);
+                let is_stated = doubt.variance.is_finite() && doubt.variance >= 0.0;
+                let motion = GroundVelocity {
+                    at,
+                    velocity_mps: vector(velocity),
+                    fom_mps: (is_stated && doubt.variance > 0.0).then(|| math::sqrt(doubt.variance)),
+                    is_valid: doubt.is_valid && is_stated,
+                    status: doubt.status,
+                };
+                device.tell(&motion, &mut line);
             }
             (Emulated::Tether(device), Value::Payout(chainage_m)) => {
                 device.tell(&Payout { at, chainage_m }, &mut line);
             }
-            _ => return false,
+            _ => (),
         }
-        is_sent
+        if is_sent { Ok(()) } else { Err(Unsent::Unencodable) }
     }
 }

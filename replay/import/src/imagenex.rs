@@ -1,5 +1,6 @@
 //! Files written by Imagenex's own software.
 
+use crate::calendar::{DAY_NS, days_since_1970};
 use crate::entry::{Clock, Entry, Step};
 use crate::format::Format;
 use headrace_geometry::time::DurNs;
@@ -12,7 +13,6 @@ pub struct ImagenexFormat;
 /// Name of the only stream in an Imagenex file: all returns belong to it.
 pub const STREAM: &str = "imagenex";
 
-const DAY_NS: u64 = 86_400_000_000_000;
 const HEADER_BYTES: usize = 100;
 
 impl Format for ImagenexFormat {
@@ -41,29 +41,6 @@ impl Format for ImagenexFormat {
 
 /// Converts a date (day, month, year) and a time of that day to nanoseconds since 1970.
 fn stamp_ns((day, month, year): (u8, u8, u16), time: DurNs) -> Option<u64> {
-    const LENGTHS: [u64; 12] = [31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31];
-    let leap = |year: u16| year.is_multiple_of(4) && (!year.is_multiple_of(100) || year.is_multiple_of(400));
-    if !(1970..2200).contains(&year) || !(1..=31).contains(&day) || !(1..=12).contains(&month) {
-        return None;
-    }
-    let years: u64 = (1970..year).map(|year| if leap(year) { 366 } else { 365 }).sum();
-    let months: u64 = LENGTHS.iter().take(usize::from(month) - 1).sum();
-    let leap_day = u64::from(leap(year) && month > 2);
-    let days = years + months + leap_day + u64::from(day) - 1;
+    let days = days_since_1970(year.into(), month.into(), day.into())?;
     Some(days * DAY_NS + time.0.unsigned_abs())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn dates_are_converted_to_time_since_1970() {
-        let days = |date| stamp_ns(date, DurNs(0)).map(|ns| ns / DAY_NS);
-        assert_eq!(days((1, 1, 1970)), Some(0));
-        assert_eq!(days((1, 3, 2000)), Some(11_017));
-        assert_eq!(days((18, 11, 2016)), Some(17_123));
-        assert_eq!(days((31, 12, 2100)), Some(47_846));
-        assert_eq!([days((0, 1, 2000)), days((1, 13, 2000)), days((1, 1, 1969))], [None; 3]);
-    }
 }

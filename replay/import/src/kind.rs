@@ -5,6 +5,7 @@ use std::path::Path;
 use headrace_sensor::connect::Connect;
 use headrace_sensor::device::DeviceKind as _;
 
+use crate::a50::{self, A50Format};
 use crate::candump::Candump;
 use crate::format::Format;
 use crate::imagenex::{self, ImagenexFormat};
@@ -22,6 +23,8 @@ pub enum FileKind {
     Imagenex,
     /// Log of the program Ping Viewer.
     Ping,
+    /// Lines of a velocity log A50 or A125.
+    A50,
     /// Table of values, with a mapping that describes its columns.
     Csv,
     /// Bag of ROS 1.
@@ -32,8 +35,16 @@ pub enum FileKind {
 
 impl FileKind {
     /// All kinds of foreign logs, in the order in which help lists them.
-    pub const ALL: [Self; 7] =
-        [Self::Tlog, Self::Candump, Self::Imagenex, Self::Ping, Self::Csv, Self::Rosbag, Self::Mcap];
+    pub const ALL: [Self; 8] = [
+        Self::Tlog,
+        Self::Candump,
+        Self::Imagenex,
+        Self::Ping,
+        Self::A50,
+        Self::Csv,
+        Self::Rosbag,
+        Self::Mcap,
+    ];
 
     /// Recognises the kind of a file by the extension of its name, in upper or lower case.
     pub fn of(path: &Path) -> Option<Self> {
@@ -43,6 +54,7 @@ impl FileKind {
             "log" => Some(Self::Candump),
             "852" | "81a" | "81b" | "81s" | "31l" => Some(Self::Imagenex),
             "bin" => Some(Self::Ping),
+            "json" | "jsonl" => Some(Self::A50),
             "csv" => Some(Self::Csv),
             "bag" => Some(Self::Rosbag),
             "mcap" => Some(Self::Mcap),
@@ -57,6 +69,7 @@ impl FileKind {
             Self::Candump => "candump",
             Self::Imagenex => "imagenex",
             Self::Ping => "ping",
+            Self::A50 => "a50",
             Self::Csv => "csv",
             Self::Rosbag => "rosbag",
             Self::Mcap => "mcap",
@@ -75,6 +88,7 @@ impl FileKind {
             Self::Candump => "Text of `candump -l` or `-L`",
             Self::Imagenex => "File of the software of Imagenex 881 and 852",
             Self::Ping => "Log of Ping Viewer",
+            Self::A50 => "Lines of JSON from an A50 or A125",
             Self::Csv => "Table of values, with --map",
             Self::Rosbag => "Bag of ROS 1",
             Self::Mcap => "Recording of ROS 2 (or 1) in MCAP",
@@ -86,17 +100,19 @@ impl FileKind {
         match self {
             Self::Tlog | Self::Candump => "frame",
             Self::Imagenex => "shot",
-            Self::Ping | Self::Csv | Self::Rosbag | Self::Mcap => "message",
+            Self::Ping | Self::A50 | Self::Csv | Self::Rosbag | Self::Mcap => "message",
         }
     }
 
-    /// Returns the format of this kind of file; `None` if the format needs a vehicle file or a mapping.
-    pub fn format(self) -> Option<Box<dyn Format>> {
+    /// Returns the format of this kind of file; `None` if the format needs a vehicle file or a mapping. The name of the
+    /// file may give the time at which it starts.
+    pub fn format(self, file_name: &str) -> Option<Box<dyn Format>> {
         match self {
             Self::Tlog => Some(Box::<TlogFormat>::default()),
             Self::Candump => Some(Box::new(Candump)),
             Self::Imagenex => Some(Box::new(ImagenexFormat)),
-            Self::Ping => Some(Box::<PingFormat>::default()),
+            Self::Ping => Some(Box::new(PingFormat::new(file_name))),
+            Self::A50 => Some(Box::<A50Format>::default()),
             Self::Csv | Self::Rosbag | Self::Mcap => None,
         }
     }
@@ -108,7 +124,7 @@ impl FileKind {
 
     /// Whether a file of this kind comes from a single device.
     pub(crate) fn has_one_device(self) -> bool {
-        matches!(self, Self::Imagenex | Self::Ping)
+        matches!(self, Self::Imagenex | Self::Ping | Self::A50)
     }
 
     /// Returns the plugin of the sensors whose bytes are in files of this kind; empty if the files contain values.
@@ -118,6 +134,7 @@ impl FileKind {
             Self::Candump => headrace_imu_can::ImuCanKind.name(),
             Self::Imagenex => headrace_imagenex881::Imagenex881Kind.name(),
             Self::Ping => headrace_ping1d::Ping1dKind.name(),
+            Self::A50 => headrace_a50::A50Kind.name(),
             Self::Csv | Self::Rosbag | Self::Mcap => "",
         }
     }
@@ -140,6 +157,7 @@ impl FileKind {
             Self::Candump => "INTERFACE",
             Self::Imagenex => imagenex::STREAM,
             Self::Ping => ping::STREAM,
+            Self::A50 => a50::STREAM,
             Self::Csv | Self::Rosbag | Self::Mcap => "ID",
         }
     }

@@ -9,6 +9,8 @@
 
 #![cfg_attr(not(test), warn(clippy::indexing_slicing))]
 
+pub mod a50;
+mod calendar;
 pub mod candump;
 pub mod csv;
 pub mod detect;

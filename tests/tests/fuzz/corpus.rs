@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Cursor;
 
+use headrace_a50::report::{Against, Velocity};
 use headrace_geometry::time::{DurNs, MonoNs};
 use headrace_mavlink::MavHeader;
 use headrace_mavlink::dialect::ATTITUDE_DATA;
@@ -30,6 +31,7 @@ pub(crate) enum Kind {
     Candump,
     Imagenex,
     Ping,
+    A50,
     Csv,
     Bag,
     Mcap,
@@ -44,12 +46,13 @@ pub(crate) enum Kind {
     Viewer,
 }
 
-const KINDS: [(Kind, &str); 13] = [
+const KINDS: [(Kind, &str); 14] = [
     (Kind::Log, "log"),
     (Kind::Tlog, "tlog"),
     (Kind::Candump, "candump"),
     (Kind::Imagenex, "imagenex"),
     (Kind::Ping, "ping"),
+    (Kind::A50, "a50"),
     (Kind::Csv, "csv"),
     (Kind::Bag, "bag"),
     (Kind::Mcap, "mcap"),
@@ -108,6 +111,7 @@ impl Corpus {
         add(Kind::Candump, (0..60).map(line).collect::<String>().into_bytes());
         add(Kind::Imagenex, (10..30).flat_map(shot).collect());
         add(Kind::Ping, ping_log(20));
+        add(Kind::A50, (0..10).flat_map(velocity).collect());
         add(Kind::Csv, fixture("values.csv")[..3000].to_vec());
         add(Kind::Csv, fixture("heads.csv"));
         for name in ["none.bag", "lz4.bag", "bz2.bag"] {
@@ -248,6 +252,21 @@ fn ping_log(records: u32) -> Vec<u8> {
         file.extend(message);
     }
     file
+}
+
+fn velocity(number: i64) -> Vec<u8> {
+    let at_us = 1_700_000_000_000_000 + number * 200_000;
+    Velocity {
+        against: Against::Bottom,
+        velocity_mps: [0.1, 0.2, 0.3],
+        fom_mps: 0.002,
+        altitude_m: 1.5,
+        valid_beams: 4,
+        is_valid: true,
+        status: 0,
+        times_us: Some([at_us, at_us + 100_000]),
+    }
+    .encode()
 }
 
 fn shot(seconds: u8) -> Vec<u8> {

@@ -6,6 +6,7 @@ use headrace_config::Document;
 use headrace_config::plain::is_plain;
 use headrace_devices::KINDS;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_import::a50::{self, A50Format};
 use headrace_import::candump::Candump;
 use headrace_import::csv::Csv;
 use headrace_import::detect::looks_like;
@@ -96,6 +97,7 @@ impl Surroundings {
             Kind::Tlog => tlog::STREAM,
             Kind::Imagenex => imagenex::STREAM,
             Kind::Ping => ping::STREAM,
+            Kind::A50 => a50::STREAM,
             _ => "can0",
         };
         let setup = DriverSetup { begun: MonoNs(0), head: None };
@@ -300,6 +302,7 @@ fn imported(kind: Kind, bytes: &[u8], around: &Surroundings) -> u64 {
         Kind::Candump => Box::new(Candump),
         Kind::Imagenex => Box::new(ImagenexFormat),
         Kind::Ping => Box::<PingFormat>::default(),
+        Kind::A50 => Box::<A50Format>::default(),
         Kind::Csv => {
             let Some(table) = table(bytes, around) else { return 0 };
             Box::new(table)
@@ -322,10 +325,9 @@ fn table(bytes: &[u8], around: &Surroundings) -> Option<Csv> {
     };
     let values = columns(&[["depth", "depth", "pressure", "Pa"], ["tether", "tether", "chainage", "m"]]);
     let heads = columns(&[["angle", "sonar_0", "angle", "rad"], ["range", "sonar_0", "range", "m"]]);
-    let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
-    let line = String::from_utf8_lossy(line);
+    let front = String::from_utf8_lossy(bytes);
     [values, heads].iter().find_map(|text| {
-        Csv::new(&Document::new("map.toml", text).root().unwrap(), &around.vehicle, &line).ok()
+        Csv::new(&Document::new("map.toml", text).root().unwrap(), &around.vehicle, &front).ok()
     })
 }
 

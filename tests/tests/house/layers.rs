@@ -22,7 +22,14 @@ const FOR_REPLAY: [(&str, &[&str]); 4] = [
     ("replay/player", &["replay/simulator"]),
     (
         "replay/import",
-        &["replay/player", "plugins/imagenex881", "plugins/imu_can", "plugins/mavlink", "plugins/ping1d"],
+        &[
+            "replay/player",
+            "plugins/a50",
+            "plugins/imagenex881",
+            "plugins/imu_can",
+            "plugins/mavlink",
+            "plugins/ping1d",
+        ],
     ),
 ];
 

@@ -326,7 +326,7 @@ fn wrong_file_kind_is_refused_with_the_likely_kind() {
     for (file, words) in [
         ("empty.tlog", &["in its 0 bytes", "empty"][..]),
         ("bag.tlog", &["a ROS bag"]),
-        ("what.dat", &["--format tlog|candump|imagenex|ping|csv", "a log of candump"]),
+        ("what.dat", &["--format tlog|candump|imagenex|ping|a50|csv", "a log of candump"]),
         ("absent.tlog", &["reading absent.tlog"]),
     ] {
         refused(&folder, &[&[file][..], &with].concat(), words);

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a failed step ends the test")]
 
+mod doubt;
 mod import;
 mod recordings;
 mod ros_dive;

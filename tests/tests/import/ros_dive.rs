@@ -118,17 +118,15 @@ impl Translator {
             }
             id if id.starts_with("ping") => {
                 let mm = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
-                // An echosounder assumes a speed of sound of 1500 m/s, but the speed in this water is 1447 m/s.
-                let range_m = if mm == 0 { f64::INFINITY } else { f64::from(mm) / 1000.0 * 1447.0 / 1500.0 };
+                let range_m = if mm == 0 { f64::INFINITY } else { f64::from(mm) / 1000.0 };
                 let cdr = stamped.number([0]).f32(0.4).f32(0.3).f32(100.0).f32(range_m);
                 Some((format!("/{id}"), "sensor_msgs/msg/Range", cdr))
             }
             id => {
                 let (header, _) = Header::decode(bytes, Some(Model::Head881)).unwrap();
                 let angle = (f64::from(header.position) - 600.0) * std::f64::consts::TAU / 1200.0;
-                let range_m = header
-                    .profile_mm(Model::Head881)
-                    .map_or(f64::INFINITY, |mm| f64::from(mm) / 1000.0 * 1447.0 / 1500.0);
+                let range_m =
+                    header.profile_mm(Model::Head881).map_or(f64::INFINITY, |mm| f64::from(mm) / 1000.0);
                 let cdr = [angle, angle, 0.0, 0.0, 0.0, 0.1, 100.0].into_iter().fold(stamped, Cdr::f32);
                 let cdr = cdr.u32(1).f32(range_m).u32(0);
                 Some((format!("/{id}"), "sensor_msgs/msg/LaserScan", cdr))
@@ -168,7 +166,9 @@ fn imported_ros_recording_equals_its_original_dive() {
     folder.write("ros.mcap", recording(&messages));
     let ids = ["depth", "imu", "ping_left", "ping_right", "ping_up", "ping_down", "sonar_0", "sonar_1"];
     let table = |topic: &str, id: &str| format!("[[topics]]\ntopic = \"/{topic}\"\nsensor = \"{id}\"\n");
-    let mapping: String = ids.iter().map(|id| table(id, id)).collect();
+    // The devices assume a speed of sound of 1500 m/s, but the speed in this water is 1447 m/s.
+    let speed = |id: &str| if matches!(id, "depth" | "imu") { "" } else { "sound_speed_mps = 1500\n" };
+    let mapping: String = ids.iter().map(|id| table(id, id) + speed(id)).collect();
     folder.write("topics.toml", mapping + &table("cable", "tether"));
     let arguments = ["import", "ros.mcap", "--map", "topics.toml", "--vehicle", "vehicle.toml"];
     let answer = folder.headrace(&[&arguments[..], &["-o", "out.mcap"]].concat());

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 
 use headrace_geometry::frames::Rot;
 use headrace_geometry::time::MonoNs;
+use headrace_sensor::device::Sense;
 
 use super::clocks::{Base, Clocks};
 use super::message::{Read, Type, Values, read};
 use super::points::{Beam, Beams, Plane};
 use super::wire::Encoding;
-use crate::emulated::{BEYOND, EmulatedSensor, Value};
+use crate::emulated::{BEYOND, Doubt, EmulatedSensor, Unsent, Value};
 use crate::entry::{Entry, ImportReport};
 
 /// Settings that the mapping gives for a topic, apart from its sensor.
@@ -18,12 +19,16 @@ pub(super) struct Manner {
     pub(super) base: Base,
     /// Factor that converts a pressure or length to SI units.
     pub(super) unit: f64,
+    /// Whether pressures are gauge pressures, above the air's pressure.
+    pub(super) is_gauge: bool,
+    /// Speed of sound with which the device computed ranges, m/s; `None` for that of the site.
+    pub(super) sound_speed_mps: Option<f64>,
     pub(super) plane: Plane,
 }
 
 impl Default for Manner {
     fn default() -> Self {
-        Self { base: Base::Record, unit: 1.0, plane: Plane::Yz }
+        Self { base: Base::Record, unit: 1.0, is_gauge: false, sound_speed_mps: None, plane: Plane::Yz }
     }
 }
 
@@ -46,6 +51,13 @@ pub(super) struct Feed {
     /// Number of messages or points with a remark that isn't a loss, by the remark's text.
     noted: BTreeMap<&'static str, u64>,
 }
+
+/// Losses of the parts of an inertial message whose variances are too large.
+const UNCERTAIN_PARTS: [&str; 3] = [
+    "readings of orientation whose variance exceeds the noise in [navigation] of the vehicle file, withheld",
+    "readings of turn rate whose variance exceeds that of navigation without gyro, withheld",
+    "readings of specific force whose variance exceeds that of navigation without accelerometer, withheld",
+];
 
 /// Lowest plausible pressure under water, Pa: half an atmosphere.
 const LEAST_PA: f64 = 50_000.0;
@@ -96,13 +108,24 @@ impl Feed {
         let (at_ns, stamped) = self.clocks.time(record_ns, read.header.map(|header| header.stamp_ns));
         let value = match &read.values {
             Values::Beams(beams) => return self.beams(beams, (at_ns, stamped), out),
-            Values::Inertial { wxyz, rate_radps, force_mps2 } => {
-                self.inertia(*wxyz, *rate_radps, *force_mps2)?
+            Values::Inertial { wxyz, rate_radps, force_mps2, variances } => {
+                let [attitude, rate, force] = self.sensor.are_certain(*variances);
+                for (is_certain, why) in [attitude, rate, force].into_iter().zip(UNCERTAIN_PARTS) {
+                    if !is_certain {
+                        *self.lost.entry(why).or_default() += 1;
+                    }
+                }
+                self.inertia(
+                    wxyz.filter(|_| attitude),
+                    rate_radps.filter(|_| rate),
+                    force_mps2.filter(|_| force),
+                )?
             }
-            Values::Range(range_m) => Value::Range(*range_m),
+            Values::Range(range_m) => Value::Range(range_m.map(|range_m| self.true_range_m(range_m))),
             Values::Scalar(value) if !value.is_finite() => return Err("whose value isn't a number"),
             Values::Scalar(value) if self.of == Type::FluidPressure => {
-                let pressure_pa = value * self.manner.unit;
+                let zero_pa = if self.manner.is_gauge { self.sensor.site.surface_pressure_pa } else { 0.0 };
+                let pressure_pa = zero_pa + value * self.manner.unit;
                 self.highest_pa = self.highest_pa.max(pressure_pa);
                 Value::Pressure(pressure_pa)
             }
@@ -112,7 +135,19 @@ impl Feed {
             }
             Values::Velocity(_) => return Err("whose value isn't a number"),
         };
-        self.say((at_ns, stamped), &value, out)
+        let mut doubt = read.doubt;
+        doubt.variance *= self.manner.unit * self.manner.unit;
+        match self.say((at_ns, stamped), &value, &doubt, out) {
+            Ok(()) => Ok(()),
+            Err(Unsent::Unencodable) => Err("with values that the sensor can't encode"),
+            Err(Unsent::Doubtful(why)) => Err(why),
+        }
+    }
+
+    /// Converts a range from the speed of sound of the recording to that of the site.
+    fn true_range_m(&self, range_m: f64) -> f64 {
+        let site = self.sensor.site;
+        self.manner.sound_speed_mps.map_or(range_m, |mps| site.rescaled_range_m(range_m, mps))
     }
 
     /// Converts an inertial message. Attitude, turn rate or force may be missing, but not all three.
@@ -176,9 +211,10 @@ impl Feed {
         for Beam { angle_rad, range_m, after_s } in &valid.beams {
             let from_s = if at.1 { *after_s } else { after_s - last_s };
             let at_ns = at.0.saturating_add_signed(headrace_geometry::time::DurNs::from_secs_f64(from_s).0);
-            let (value, is_beyond) = self.sensor.within_reach(Value::Beam(*angle_rad, *range_m));
+            let range_m = range_m.map(|range_m| self.true_range_m(range_m));
+            let (value, is_beyond) = self.sensor.within_reach(Value::Beam(*angle_rad, range_m));
             beyond += u64::from(is_beyond);
-            unsaid += u64::from(self.say((at_ns, at.1), &value, out).is_err());
+            unsaid += u64::from(self.say((at_ns, at.1), &value, &Doubt::NONE, out).is_err());
         }
         if beyond > 0 {
             *self.lost.entry(BEYOND).or_default() += beyond;
@@ -194,14 +230,14 @@ impl Feed {
         &mut self,
         (at_ns, stamped): (u64, bool),
         value: &Value,
+        doubt: &Doubt,
         out: &mut Vec<Entry>,
-    ) -> Result<(), &'static str> {
+    ) -> Result<(), Unsent> {
         let stream = self.sensor.id.clone();
-        let said = self.sensor.tell(MonoNs(at_ns), value, &mut |received, bytes| {
+        self.sensor.tell(MonoNs(at_ns), value, doubt, &mut |received, bytes| {
             let stamp_ns = if stamped { received.0 } else { at_ns };
             out.push(Entry { stamp_ns, stream: stream.clone(), bytes: bytes.to_vec() });
-        });
-        if said { Ok(()) } else { Err("with values that the sensor can't encode") }
+        })
     }
 
     /// Adds the topic's losses and remarks to the report.
@@ -235,13 +271,17 @@ impl Feed {
         if self.of == Type::FluidPressure && self.taken > 0 && self.highest_pa < LEAST_PA {
             let highest_pa = self.highest_pa;
             remark(format!(
-                "no pressure is above {highest_pa:.1} Pa, which is less than air pressure; set `unit` in the mapping"
+                "no pressure is above {highest_pa:.1} Pa, which is less than air pressure; set `unit`, or `quantity = \"gauge_pressure\"`, in the mapping"
             ));
+        }
+        let has_ranges = matches!(self.of.sense(), Sense::Head | Sense::Echosounder);
+        if has_ranges && self.manner.sound_speed_mps.is_none() {
+            remark(self.sensor.assumed_speed());
         }
     }
 }
 
 /// Returns "messages " as the unit in which losses are counted. Empty if the reason `why` begins with its own unit.
 fn messages(why: &str) -> &'static str {
-    if why.starts_with("points") || why.starts_with("ranges") { "" } else { "messages " }
+    if ["points", "ranges", "readings"].iter().any(|unit| why.starts_with(unit)) { "" } else { "messages " }
 }

@@ -44,7 +44,7 @@ impl Feeds {
     ///
     /// A message belongs to no sensor if its topic is unassigned, or if its type isn't the type that the topic's sensor
     /// expects.
-    pub(super) fn take(
+    pub(crate) fn take(
         &mut self,
         topic: &Topic,
         encoding: Encoding,
@@ -60,7 +60,7 @@ impl Feeds {
         }
     }
 
-    pub(super) fn report(&self) -> ImportReport {
+    pub(crate) fn report(&self) -> ImportReport {
         let mut report = ImportReport::default();
         for (topic, feed) in &self.by_topic {
             feed.tell(topic, &mut report);

@@ -9,7 +9,7 @@ use super::feed::{Feed, Manner};
 use super::feeds::{Feeds, Topic};
 use super::message::Type;
 use super::points::Plane;
-use crate::csv::{LENGTH, PRESSURE};
+use crate::csv::{LENGTH, PRESSURE, SOUND_SPEED_MPS};
 use crate::emulated::EmulatedSensor;
 
 /// Reason why topics can't be assigned to sensors.
@@ -154,12 +154,18 @@ fn feed(
     let takes_unit = matches!(of.sense(), Sense::Depth | Sense::Tether);
     let unit = if takes_unit { section.choice("unit", units)? } else { None };
     let factor = if takes_unit { section.number("factor", -1e9..=1e9)? } else { None };
+    let pressures = [("pressure", false), ("gauge_pressure", true)];
+    let is_gauge = if of.sense() == Sense::Depth { section.choice("quantity", &pressures)? } else { None };
+    let has_ranges = matches!(of.sense(), Sense::Head | Sense::Echosounder);
+    let sound_speed_mps = if has_ranges { section.number("sound_speed_mps", SOUND_SPEED_MPS)? } else { None };
     let takes_plane = matches!(of, Type::PointCloud | Type::PointCloud2);
     let planes = [("yz", Plane::Yz), ("xy", Plane::Xy)];
     let plane = if takes_plane { section.choice("plane", &planes)? } else { None };
     let manner = Manner {
         base: base.unwrap_or_default(),
         unit: unit.unwrap_or(1.0) * factor.unwrap_or(1.0),
+        is_gauge: is_gauge.unwrap_or(false),
+        sound_speed_mps,
         plane: plane.unwrap_or(Plane::Yz),
     };
     Ok((name, Feed::new(of, sensor, manner)))

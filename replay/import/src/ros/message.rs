@@ -7,6 +7,7 @@ use headrace_sensor::device::Sense;
 
 use super::points::{Beams, cloud, heard, points, scan};
 use super::wire::{Encoding, Header, Wire};
+use crate::emulated::Doubt;
 
 /// A supported type of message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -53,7 +54,7 @@ const TYPES: [(Type, &str, &str); 10] = [
 
 impl Type {
     /// Finds a type by its name in the form of ROS 1 (`sensor_msgs/Imu`) or ROS 2 (`sensor_msgs/msg/Imu`).
-    pub(super) fn named(name: &str) -> Option<Self> {
+    pub(crate) fn named(name: &str) -> Option<Self> {
         let name = name.replacen("/msg/", "/", 1);
         TYPES.iter().find(|(_, known, _)| *known == name).map(|(known, ..)| *known)
     }
@@ -89,6 +90,8 @@ pub(super) enum Values {
         wxyz: Option<[f64; 4]>,
         rate_radps: Option<[f64; 3]>,
         force_mps2: Option<[f64; 3]>,
+        /// Variances of tilt, heading, turn rate and specific force, in squares of SI units; 0 if not stated.
+        variances: [f64; 4],
     },
     /// A range, m; `None` without an echo.
     Range(Option<f64>),
@@ -102,6 +105,8 @@ pub(super) enum Values {
 pub(super) struct Read<'a> {
     pub(super) header: Option<Header<'a>>,
     pub(super) values: Values,
+    /// Doubt in the values, apart from the variances of an inertial message.
+    pub(super) doubt: Doubt,
 }
 
 /// Parses a message.
@@ -119,11 +124,17 @@ pub(super) fn read(of: Type, encoding: Encoding, bytes: &[u8]) -> Result<Read<'_
 
 fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static str>> {
     let header = if of.is_self_describing() { Some(wire.header()?) } else { None };
+    let mut doubt = Doubt::NONE;
     let values = match of {
         Type::Imu => inertial(wire)?,
-        Type::Range => range(wire)?,
+        Type::Range => {
+            let (range, variance) = range(wire)?;
+            doubt.variance = variance;
+            range
+        }
         Type::FluidPressure => {
-            let [pressure, _variance] = wire.doubles()?;
+            let [pressure, variance] = wire.doubles()?;
+            doubt.variance = variance;
             Values::Scalar(pressure)
         }
         Type::LaserScan => Values::Beams(scan(wire)?),
@@ -135,25 +146,29 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
         Type::Twist | Type::TwistWithCovariance => {
             let [x, y, z, _, _, _] = wire.doubles()?;
             if of == Type::TwistWithCovariance {
-                let _covariance: [f64; 36] = wire.doubles()?;
+                let covariance: [f64; 36] = wire.doubles()?;
+                doubt.variance = largest(&covariance, &[0, 7, 14]);
             }
             Values::Velocity([x, y, z])
         }
         Type::Float32 => Values::Scalar(wire.f32()?.into()),
         Type::Float64 => Values::Scalar(wire.f64()?),
     };
-    Some(Ok(Read { header, values }))
+    Some(Ok(Read { header, values, doubt }))
 }
 
 /// Parses an inertial message. A covariance whose first element is -1 marks a missing value.
 fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
+    let is_known = |covariance: &[f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
     let [x, y, z, w] = wire.doubles()?;
-    let is_known = |covariance: [f64; 9]| covariance.first().is_none_or(|first| !is_minus_one(*first));
-    let wxyz = is_known(wire.doubles()?).then_some([w, x, y, z]);
+    let of_attitude: [f64; 9] = wire.doubles()?;
+    let wxyz = is_known(&of_attitude).then_some([w, x, y, z]);
     let rate: [f64; 3] = wire.doubles()?;
-    let rate_radps = is_known(wire.doubles()?).then_some(rate);
+    let of_rate: [f64; 9] = wire.doubles()?;
+    let rate_radps = is_known(&of_rate).then_some(rate);
     let force: [f64; 3] = wire.doubles()?;
-    let force_mps2 = is_known(wire.doubles()?).then_some(force);
+    let of_force: [f64; 9] = wire.doubles()?;
+    let force_mps2 = is_known(&of_force).then_some(force);
     let whole = |values: &[f64]| values.iter().all(|value| value.is_finite());
     // Senders that know no orientation leave the field at its default, which is all zeros.
     let wxyz = wxyz.filter(|wxyz| whole(wxyz) && wxyz.iter().any(|part| part.abs() > 0.0));
@@ -161,21 +176,32 @@ fn inertial(wire: &mut Wire<'_>) -> Option<Values> {
         wxyz,
         rate_radps: rate_radps.filter(|it| whole(it)),
         force_mps2: force_mps2.filter(|it| whole(it)),
+        variances: [
+            largest(&of_attitude, &[0, 4]),
+            largest(&of_attitude, &[8]),
+            largest(&of_rate, &[0, 4, 8]),
+            largest(&of_force, &[0, 4, 8]),
+        ],
     })
+}
+
+/// Returns the largest of some elements of a covariance matrix; NaN if one of them is NaN.
+fn largest(covariance: &[f64], of: &[usize]) -> f64 {
+    let elements = of.iter().filter_map(|at| covariance.get(*at));
+    elements.fold(f64::NEG_INFINITY, |most, next| if next.is_nan() || *next > most { *next } else { most })
 }
 
 fn is_minus_one(value: f64) -> bool {
     value.to_bits() == (-1.0_f64).to_bits()
 }
 
-fn range(wire: &mut Wire<'_>) -> Option<Values> {
+/// Parses a range and its variance, which is 0 if it isn't stated.
+fn range(wire: &mut Wire<'_>) -> Option<(Values, f64)> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
-    // Newer definitions of this message end with a variance, which isn't used.
-    if !wire.is_done() {
-        wire.f32()?;
-    }
-    Some(Values::Range(heard(range, least, most)))
+    // Only newer definitions of this message end with a variance.
+    let variance = if wire.is_done() { 0.0 } else { wire.f32()?.into() };
+    Some((Values::Range(heard(range, least, most)), variance))
 }
 
 #[cfg(test)]

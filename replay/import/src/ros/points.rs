@@ -94,11 +94,34 @@ impl Beams {
             return Err("whose beams take more than 120 s");
         }
         valid.beams.sort_by(|one, other| one.after_s.total_cmp(&other.after_s));
+        if valid.are_mostly_on_one_ray() {
+            return Err(ON_ONE_RAY);
+        }
         Ok(valid)
     }
 }
 
+/// Reason to refuse a message with the points of an echo.
+const ON_ONE_RAY: &str = "with points behind one another on one ray: the points of an echo, not ranges; a head has one \
+                          range for each ping, so detect the wall in each echo first";
+/// Largest difference of two angles on one ray, radians: above the rounding of coordinates, below the step of any head.
+const SAME_RAY_RAD: f64 = 1e-4;
+
 impl ValidBeams {
+    /// Whether most beams have the angle and time of the beam before them, but another range.
+    fn are_mostly_on_one_ray(&self) -> bool {
+        let is_same = |pair: &[Beam]| match pair {
+            [one, next] => {
+                (next.angle_rad - one.angle_rad).abs() < SAME_RAY_RAD
+                    && next.after_s <= one.after_s
+                    && next.range_m != one.range_m
+            }
+            _ => false,
+        };
+        let same = self.beams.windows(2).filter(|pair| is_same(pair)).count();
+        same > 1 && 2 * same > self.beams.len()
+    }
+
     fn point(&mut self, [x, y, z]: [f64; 3], after_s: f64, plane: Plane) {
         let (across, along, off) = match plane {
             Plane::Yz => (y, -z, x),

@@ -16,7 +16,10 @@ use crate::{Entry, Format, Step};
 
 /// Splits a file by a format. Returns the entries, the lengths of the losses with their reasons, and the number of
 /// bytes left at the end of the file.
-fn cut(format: &mut dyn Format, mut file: &[u8]) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
+pub(crate) fn cut(
+    format: &mut dyn Format,
+    mut file: &[u8],
+) -> (Vec<Entry>, Vec<(usize, &'static str)>, usize) {
     let (mut entries, mut lost) = (Vec::new(), Vec::new());
     while !file.is_empty() {
         let used = match format.step(file, true, &mut entries) {
@@ -51,13 +54,14 @@ fn text(text: &str) -> Vec<u8> {
     [&u32::try_from(units.len()).unwrap().to_be_bytes()[..], &units].concat()
 }
 
-fn ping_log(records: &[(&str, &[u8])]) -> Vec<u8> {
+/// Builds a log of Ping Viewer for a type of sensor: 1 for a Ping echosounder.
+pub(super) fn ping_log(sensor_type: u8, records: &[(&str, &[u8])]) -> Vec<u8> {
     let mut file = text("PingViewer sensor log file");
     file.extend(1_u32.to_be_bytes());
     for words in ["abc", "2024-01-01", "v2.4", "Linux", "12"] {
         file.extend(text(words));
     }
-    file.extend([0, 0, 0, 1, 0, 0, 0, 1]);
+    file.extend([0, 0, 0, 1, 0, 0, 0, sensor_type]);
     for (time, message) in records {
         file.extend(text(time));
         file.extend(u32::try_from(message.len()).unwrap().to_be_bytes());
@@ -92,7 +96,7 @@ fn telemetry_log_reader_finds_the_next_frame_after_damage() {
 
 #[test]
 fn ping_viewer_times_continue_after_midnight() {
-    let file = ping_log(&[("23:59:59.999", b"one"), ("00:00:00.001\0", b"two")]);
+    let file = ping_log(1, &[("23:59:59.999", b"one"), ("00:00:00.001\0", b"two")]);
     let (entries, lost, left) = cut(&mut PingFormat::default(), &file);
     let got: Vec<_> =
         entries.iter().map(|entry| (entry.stamp_ns / 1_000_000, entry.bytes.as_slice())).collect();
@@ -145,7 +149,7 @@ proptest! {
         which in 0_usize..3,
         at in 0_usize..400,
     ) {
-        let whole = [tlog(0..6), [shot(1), shot(2), shot(3)].concat(), ping_log(&[("01:02:03.004", &b"BR"[..]); 5])];
+        let whole = [tlog(0..6), [shot(1), shot(2), shot(3)].concat(), ping_log(1, &[("01:02:03.004", &b"BR"[..]); 5])];
         let mut damaged = whole[which].clone();
         for (place, byte) in damaged.iter_mut().skip(at).zip(bytes.iter().take(9)) {
             *place = *byte;

@@ -1,4 +1,5 @@
 //! Tests of the import and of the formats, on constructed files.
 
-mod formats;
+mod doubt;
+pub(crate) mod formats;
 mod machinery;
