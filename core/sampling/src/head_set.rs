@@ -33,6 +33,18 @@ impl HeadSet {
         Self(self.0 | other.0)
     }
 
+    /// The intersection of two sets: heads that are in both sets.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    /// This set without the heads of another set.
+    #[must_use]
+    pub fn difference(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
     /// The set as a number: bit k for head k.
     pub fn bits(self) -> u8 {
         self.0
@@ -60,7 +72,12 @@ impl HeadSet {
 
     /// Head numbers in ascending order.
     pub fn iter(self) -> impl Iterator<Item = usize> {
-        (0..MAX_HEADS).filter(move |head| self.has(*head))
+        let mut left = self.0;
+        core::iter::from_fn(move || {
+            let head = (left > 0).then_some(left.trailing_zeros() as usize)?;
+            left &= left - 1;
+            Some(head)
+        })
     }
 
     fn bit(head: usize) -> u8 {
@@ -78,6 +95,8 @@ mod tests {
         assert_eq!(set.iter().collect::<Vec<_>>(), [0, 2, 3, 7]);
         assert_eq!(HeadSet::from_bits(set.bits()), set);
         assert_eq!(set.without(7).union(HeadSet::default().with(1)), HeadSet::first(4));
+        let (both, rest) = (set.intersection(HeadSet::first(3)), set.difference(HeadSet::first(3)));
+        assert_eq!((both, rest), (HeadSet::first(3).without(1), HeadSet::from_bits(0b1000_1000)));
         assert_eq!((set.len(), set.is_empty(), HeadSet::default().is_empty()), (4, false, true));
     }
 }

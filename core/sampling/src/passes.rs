@@ -67,6 +67,8 @@ pub struct Passes {
     /// Turn period of each head, seconds.
     turns_s: [f64; MAX_HEADS],
     pattern: Pattern,
+    /// Heads in step with their phases and turn periods, s, in order of phase. Other entries are empty.
+    by_phase: [(HeadSet, f64, f64); MAX_HEADS],
     /// Largest error of pass times, seconds. It arises because side-by-side heads see a place at different angles.
     parallax_s: f64,
     /// Whether the vehicle is so slow that phases along the tunnel have no meaning.
@@ -277,7 +279,7 @@ impl Phasing {
         {
             *uneven = sectors::uneven(&legs, &ahead_m.map(|ahead_m| ahead_m / (speed_mps * *sweep_s)));
         }
-        Passes { heads, in_step, turns_s, pattern, parallax_s: 0.0, at_rest, lossy: false }
+        Passes { at_rest, ..Passes::new(heads, in_step, turns_s, pattern) }
     }
 
     /// Returns the largest set of heads in step, empty if no two heads are, or all heads in sectors.
@@ -351,6 +353,20 @@ pub fn parallax_rad(profile: &Profile, heads: &[Yz]) -> f64 {
 }
 
 impl Passes {
+    fn new(heads: HeadSet, in_step: HeadSet, turns_s: [f64; MAX_HEADS], pattern: Pattern) -> Self {
+        let mut by_phase = [(HeadSet::default(), 0.0, 0.0); MAX_HEADS];
+        if let Pattern::Turning(phases) = &pattern {
+            let (known, _) = by_phase.split_at_mut(in_step.len());
+            for (slot, head) in known.iter_mut().zip(in_step.iter()) {
+                if let (Some(phase), Some(turn_s)) = (phases.get(head), turns_s.get(head)) {
+                    *slot = (HeadSet::default().with(head), *phase, *turn_s);
+                }
+            }
+            known.sort_unstable_by(|(_, a, _), (_, b, _)| a.total_cmp(b));
+        }
+        Self { heads, in_step, turns_s, pattern, by_phase, parallax_s: 0.0, at_rest: false, lossy: false }
+    }
+
     /// Returns these passes with the timing error that the parallax of side-by-side heads causes.
     ///
     /// The angles from the heads to one place on the wall differ by up to `parallax_rad`.
@@ -377,9 +393,7 @@ impl Passes {
     /// the rest of the turn. The result is continuous in `needed`, and equals `gap_s` for up to one pass.
     pub fn time_for_s(&self, seen_by: HeadSet, gap_s: f64, needed: f64) -> f64 {
         let (passing, turn_s) = match self.pattern {
-            Pattern::Turning(_) => {
-                (seen_by.iter().filter(|head| self.in_step.has(*head)).count(), self.turn_s())
-            }
+            Pattern::Turning(_) => (seen_by.intersection(self.in_step).len(), self.turn_s()),
             // A sweep there and back passes a place twice. At a sector's end, these two passes follow each other
             // immediately.
             Pattern::Sectors { sweep_s, .. } => (2, sweep_s),
@@ -413,7 +427,7 @@ impl Passes {
         }
         let in_step = heads.iter().all(|head| (turn_s(head) / turn_s(first) - 1.0).abs() < IN_STEP);
         let pattern = if in_step { Pattern::Turning(phases) } else { Pattern::Loose };
-        Ok(Self { heads, in_step: heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
+        Ok(Self::new(heads, heads, turns_s, pattern))
     }
 
     /// Creates the passes of heads that sweep sectors, as if started by a schedule for the present speed.
@@ -426,8 +440,7 @@ impl Passes {
             return Err(SamplingError::HeadCount { heads: 0 });
         }
         let pattern = Pattern::Sectors { sweep_s, uneven: 0.0 };
-        let turns_s = [0.0; MAX_HEADS];
-        Ok(Self { heads, in_step: heads, turns_s, pattern, parallax_s: 0.0, at_rest: false, lossy: false })
+        Ok(Self::new(heads, heads, [0.0; MAX_HEADS], pattern))
     }
 
     /// Returns the set of heads whose passes these are.
@@ -439,32 +452,51 @@ impl Passes {
     ///
     /// `None` if none of the heads `seen_by` turns.
     pub fn gap_s(&self, seen_by: HeadSet) -> Option<f64> {
-        let passing = || seen_by.iter().filter(|head| self.heads.has(*head));
-        passing().next()?;
-        let turn_s = |head: usize| self.turns_s.get(head).copied();
+        let passing = seen_by.intersection(self.heads);
+        if passing.is_empty() {
+            return None;
+        }
         Some(match &self.pattern {
             Pattern::Sectors { sweep_s, .. } => *sweep_s,
-            Pattern::Loose => passing().filter_map(turn_s).fold(f64::INFINITY, f64::min),
-            Pattern::Turning(phases) => {
-                let (mut known, mut count, mut longest_s) = ([0.0; MAX_HEADS], 0, 0.0_f64);
-                let in_step = passing().filter(|head| self.in_step.has(*head));
-                for (slot, head) in known.iter_mut().zip(in_step) {
-                    *slot = phases.get(head).copied().unwrap_or_default();
-                    longest_s = longest_s.max(turn_s(head).unwrap_or_default());
-                    count += 1;
-                }
-                let beside_s = if count > 1 { self.parallax_s } else { 0.0 };
-                let together = known.get_mut(..count).filter(|known| !known.is_empty());
-                let together_s = together.map(|known| longest_s * largest_gap(known) + beside_s);
-                self.alone_s(seen_by).min(together_s.unwrap_or(f64::INFINITY))
-            }
+            Pattern::Loose => self.shortest_turn_s(passing),
+            Pattern::Turning(_) => self.alone_s(passing).min(self.together_s(passing)),
         })
+    }
+
+    /// Returns the longest time between two passes of the heads in step among `passing`, s; infinite if there are none.
+    fn together_s(&self, passing: HeadSet) -> f64 {
+        let (mut first, mut last, mut between, mut turn_s, mut count) = (0.0, 0.0, 0.0_f64, 0.0_f64, 0);
+        for (head, phase, own_s) in &self.by_phase {
+            if head.intersection(passing).is_empty() {
+                continue;
+            }
+            if count == 0 {
+                first = *phase;
+            } else {
+                between = between.max(phase - last);
+            }
+            (last, turn_s, count) = (*phase, turn_s.max(*own_s), count + 1);
+        }
+        let gap = between.max(first + 1.0 - last);
+        let even = 1.0 / f64::from(count.max(1));
+        debug_assert!(
+            (even - ROUNDING..=1.0 + ROUNDING).contains(&gap),
+            "the largest gap is at least that of even phases, {even}, and at most a turn: {gap}"
+        );
+        match count {
+            0 => f64::INFINITY,
+            1 => turn_s * gap,
+            _ => turn_s * gap + self.parallax_s,
+        }
     }
 
     /// Returns the shortest turn period of the heads `seen_by` that are out of step, s; infinite if there are none.
     fn alone_s(&self, seen_by: HeadSet) -> f64 {
-        let alone = seen_by.iter().filter(|head| self.heads.has(*head) && !self.in_step.has(*head));
-        alone.filter_map(|head| self.turns_s.get(head)).copied().fold(f64::INFINITY, f64::min)
+        self.shortest_turn_s(seen_by.intersection(self.heads).difference(self.in_step))
+    }
+
+    fn shortest_turn_s(&self, heads: HeadSet) -> f64 {
+        heads.iter().filter_map(|head| self.turns_s.get(head)).copied().fold(f64::INFINITY, f64::min)
     }
 
     /// Largest unevenness of passes by two neighbouring heads at the end that their sectors share.
@@ -493,7 +525,9 @@ impl Passes {
             Pattern::Sectors { sweep_s, .. } => Self::in_sectors(self.heads, sweep_s).ok(),
             Pattern::Loose => None,
         };
-        Self { parallax_s: 0.0, pattern: even.map_or(self.pattern, |even| even.pattern), ..*self }
+        let pattern = even.map_or(self.pattern, |even| even.pattern);
+        let Self { heads, in_step, turns_s, at_rest, lossy, .. } = *self;
+        Self { at_rest, lossy, ..Self::new(heads, in_step, turns_s, pattern) }
     }
 
     /// Returns the longest time between passes of all heads with even phases, seconds; zero without a head.
@@ -532,23 +566,6 @@ impl Passes {
 /// A head that is ahead in angle passes a place earlier.
 fn scheduled_phase(head: usize, heads: usize) -> f64 {
     -(head as f64) / heads.max(1) as f64
-}
-
-/// Largest gap between neighbouring phases on a circle of circumference 1; sorts the phases.
-fn largest_gap(phases: &mut [f64]) -> f64 {
-    phases.sort_unstable_by(f64::total_cmp);
-    let wrapped = phases.first().zip(phases.last()).map_or(1.0, |(first, last)| first + 1.0 - last);
-    let between = phases.windows(2).map(|pair| match pair {
-        [a, b] => b - a,
-        _ => 0.0,
-    });
-    let gap = between.fold(wrapped, f64::max);
-    let even = 1.0 / phases.len().max(1) as f64;
-    debug_assert!(
-        (even - ROUNDING..=1.0 + ROUNDING).contains(&gap),
-        "the largest gap is at least that of even phases, {even}, and at most a turn: {gap} of {phases:?}"
-    );
-    gap
 }
 
 /// Sign of a head's rotation: 1 if its angles grow in the body's sense of rotation, -1 if in the opposite sense.

@@ -30,6 +30,8 @@ pub struct Strip {
     pub arc: Arc,
     /// The heads that see the strip.
     pub seen_by: HeadSet,
+    /// Index of `seen_by` among the different sets of heads that see a strip.
+    set: u8,
     /// Whether any part of the strip is hidden from a head whose beam sweeps over it.
     ///
     /// If true, the head's pings stop up to one angular step before the strip's edge. If the strip is only outside the
@@ -78,6 +80,8 @@ pub struct Unmet {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Strips {
     strips: Vec<Strip>,
+    /// The different sets of heads that see a strip.
+    sets: Vec<HeadSet>,
     edges_m: Vec<f64>,
     perimeter_m: f64,
     /// Two largest distances between samples of a turn on a strip, m: first among the heads that see the strip, then
@@ -94,7 +98,7 @@ pub struct Strips {
     strip_of: Vec<(usize, f64)>,
 }
 
-stateful!(Strips { state: perimeter_m; lists: strips, edges_m, steps_m, needed, strip_of; });
+stateful!(Strips { state: perimeter_m; lists: strips, sets, edges_m, steps_m, needed, strip_of; });
 
 impl Strips {
     /// Creates an empty list with capacity for the strips of `arcs` arcs and for `settings` settings of the heads.
@@ -102,6 +106,7 @@ impl Strips {
         let strips = 2 * arcs + 1;
         Self {
             strips: Vec::with_capacity(strips),
+            sets: Vec::with_capacity(strips),
             edges_m: Vec::with_capacity(2 * arcs),
             perimeter_m: 0.0,
             steps_m: Vec::with_capacity(strips * settings),
@@ -143,6 +148,15 @@ impl Strips {
             alike
         });
         self.join_at_the_seam();
+        self.sets.clear();
+        for strip in &mut self.strips {
+            let known = self.sets.iter().position(|set| *set == strip.seen_by);
+            let number = known.unwrap_or(self.sets.len());
+            if known.is_none() {
+                self.sets.push(strip.seen_by);
+            }
+            strip.set = u8::try_from(number).unwrap_or(u8::MAX);
+        }
         debug_assert!(self.covers_perimeter(), "strips cover {perimeter_m} m: {:?}", self.strips);
     }
 
@@ -275,8 +289,8 @@ impl Strips {
         target_m: f64,
         going: &Going,
     ) -> Option<Unmet> {
-        let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
-        let is_met = |limit: Limit| limit.t_m(speed_mps, going) <= target_m;
+        let thin = Thin::of(passes, &self.sets);
+        let is_met = |limit: Limit| limit.meets(target_m, speed_mps, going);
         // The samples on the two sides of a strip matter only if the samples within the strip miss the target.
         let is_unmet = |(k, strip): &(usize, &Strip)| {
             !(self.within(setting, (*k, strip), &thin).is_some_and(is_met)
@@ -284,7 +298,7 @@ impl Strips {
         };
         let (k, strip) = self.strips.iter().enumerate().find(is_unmet)?;
         Some(Unmet {
-            gap_s: thin.gap_s(k, strip.seen_by).map_or(f64::INFINITY, |gap_s| strip.wait * gap_s),
+            gap_s: thin.gap_s(strip.set, strip.seen_by).map_or(f64::INFINITY, |gap_s| strip.wait * gap_s),
             t_y_m: self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]),
             width_m: strip.arc.length_m,
         })
@@ -375,7 +389,7 @@ impl Strips {
         setting: usize,
         passes: &Passes,
     ) -> impl Iterator<Item = (usize, Option<Limit>, Option<Limit>)> {
-        let thin = Thin::of(passes, self.strips.iter().map(|strip| strip.seen_by));
+        let thin = Thin::of(passes, &self.sets);
         self.strips.iter().enumerate().map(move |(k, strip)| {
             let (within, across) =
                 (self.within(setting, (k, strip), &thin), self.across(setting, (k, strip), &thin));
@@ -385,13 +399,13 @@ impl Strips {
 
     fn within(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
         let t_y_m = self.steps_m.get(setting * self.strips.len() + k).map_or(0.0, |steps| steps[0]);
-        let gap_s = strip.wait * thin.gap_s(k, strip.seen_by)?;
+        let gap_s = strip.wait * thin.gap_s(strip.set, strip.seen_by)?;
         let [needed, _] = self.needed(setting, k, thin);
         Some(Limit { gap_s: thin.time_for_s(strip.seen_by, gap_s, needed), t_y_m, uneven: None })
     }
 
     fn across(&self, setting: usize, (k, strip): (usize, &Strip), thin: &Thin<'_>) -> Option<Limit> {
-        (!thin.is_full(k, strip.seen_by) && thin.best_s().is_finite())
+        (!thin.is_full(strip.set, strip.seen_by) && thin.best_s().is_finite())
             .then(|| {
                 let [_, needed] = self.needed(setting, k, thin);
                 let (t_y_m, is_left_out) = self.across_m(setting, k, thin);
@@ -409,7 +423,7 @@ impl Strips {
         let count = self.strips.len();
         let thin = |number: usize| {
             let number = number % count;
-            self.strips.get(number).filter(|strip| !gaps.is_full(number, strip.seen_by)).map(|_| number)
+            self.strips.get(number).filter(|strip| !gaps.is_full(strip.set, strip.seen_by)).map(|_| number)
         };
         let forward = (k..k + count).map_while(&thin);
         let back = (1..count).map(|step| k + count - step).map_while(&thin);
@@ -533,6 +547,7 @@ fn strip(views: &[View], arc: Arc, perimeter_m: f64) -> Strip {
     Strip {
         arc,
         seen_by: seen().fold(HeadSet::default(), |set, (head, _)| set.with(head)),
+        set: 0,
         hidden: views.iter().any(|view| wait(view).is_some() && hides(view)),
         wait: seen().filter_map(|(_, view)| wait(view)).reduce(f64::max).unwrap_or(1.0),
     }

@@ -16,7 +16,7 @@ pub const FARTHEST_M: f64 = 12.0;
 /// The bound of such a small tile is within 2e-10 m of the exact value.
 const NO_FINER_M: f64 = 1e-10;
 /// Upper limit of the rounding error of a computed distance, m.
-const ROUNDING_M: f64 = 1e-9;
+pub(super) const ROUNDING_M: f64 = 1e-9;
 /// Value of `owner` for a tile whose nearest sample isn't known.
 pub(super) const NO_OWNER: (f64, f64) = (f64::INFINITY, f64::INFINITY);
 /// Rounding tolerance for the proof that the bound at a corner is exact, m.

@@ -2,7 +2,7 @@
 //!
 //! Missing samples are put back, the wall is compressed or stretched, or stretches count as covered.
 
-use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
+use super::finder::{HoleFinder, NO_OWNER, ROUNDING_M, Tile, cell_m, first_tiles};
 use crate::frontier::Reach;
 use crate::store::SampleStore;
 use headrace_geometry::tunnel::WallPoint;
@@ -81,7 +81,7 @@ impl HoleFinder {
         );
         let length_m = (to_m - from_m) * along;
         let perimeter_m = store.perimeter_m() * around;
-        let reach_m = radius_m + length_m;
+        let reach_m = radius_m + ROUNDING_M;
         window.begin(perimeter_m, from_m, (-reach_m, length_m + reach_m), cell_m(radius_m));
         let mirror_m = otherwise.mirror_m();
         let mut take = |WallPoint { x_m, arc_m }: WallPoint| {

@@ -139,7 +139,6 @@ impl Window {
             sum += *begin;
             *begin = sum;
         }
-        self.spots.clear();
         self.spots.resize(self.unsorted.len(), WallPoint::default());
         for (cell, spot) in &self.unsorted {
             let Some(next) = self.begins.get_mut(*cell as usize + 1) else {

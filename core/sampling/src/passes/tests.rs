@@ -47,6 +47,16 @@ fn evenly_phased_heads_pass_at_equal_intervals() {
 }
 
 #[test]
+fn evened_passes_keep_the_turn_period_of_each_head() {
+    let mut uneven = situation(&[0.0, 100.0], &[0.0; 2]);
+    uneven.heads[1].as_mut().unwrap().rate_radps = TAU / 8.1;
+    let even = Phasing::of(&uneven).at(0.2).evened();
+    assert!(
+        (even.gap_s(HeadSet::first(1)).unwrap() - 8.0).abs() < 1e-12 && (all(&even) - 4.05).abs() < 1e-12
+    );
+}
+
+#[test]
 fn place_hidden_from_some_heads_has_longer_times_between_passes_than_other_places() {
     let passes = Passes::evenly_phased(HeadSet::first(4), |_| 8.0).unwrap();
     let gap_s =

@@ -33,18 +33,37 @@ pub(super) struct Limit {
 }
 
 impl Limit {
+    /// Whether the spacing T at a speed is at most a target, m.
+    pub(super) fn meets(&self, target_m: f64, speed_mps: f64, going: &Going) -> bool {
+        /// Squares that differ by more than this share decide like T itself, which takes longer to compute.
+        const ROUNDING: f64 = 1e-9;
+        let [t_x_m, advance_m] = self.along_m(speed_mps, going);
+        let (along_m, target_m2) = (t_x_m + advance_m, target_m * target_m);
+        let t_m2 = along_m * along_m + self.t_y_m * self.t_y_m;
+        if t_m2 < target_m2 * (1.0 - ROUNDING) {
+            return true;
+        }
+        let misses = self.uneven.is_none() && t_m2 > target_m2 * (1.0 + ROUNDING);
+        !misses && self.t_m(speed_mps, going) <= target_m
+    }
+
     pub(super) fn t_m(&self, speed_mps: f64, going: &Going) -> f64 {
+        let [t_x_m, advance_m] = self.along_m(speed_mps, going);
+        let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
+        let Some(uneven) = self.uneven else { return t_m };
+        // The row of samples on one side of the strip may be shifted relative to the row on the other side.
+        t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
+    }
+
+    /// Distance between passes at a speed, and the distance travelled between two pings, m.
+    fn along_m(&self, speed_mps: f64, going: &Going) -> [f64; 2] {
         let over_ground_mps = speed_mps + going.swing_mps;
         let lag_m2ps = going.apart_swing_mps * going.apart_m;
         let lag_m = if lag_m2ps > 0.0 { lag_m2ps / speed_mps } else { 0.0 };
         let swung_m = over_ground_mps * self.gap_s + going.shift_m + lag_m;
         let at_most_m = going.swing_most_m.map(|most_m| speed_mps * self.gap_s + going.shift_m + most_m);
         let t_x_m = at_most_m.map_or(swung_m, |at_most_m| swung_m.min(at_most_m));
-        let advance_m = over_ground_mps * going.ping_period_s;
-        let t_m = spacing::t_max_m(t_x_m, advance_m, self.t_y_m);
-        let Some(uneven) = self.uneven else { return t_m };
-        // The row of samples on one side of the strip may be shifted relative to the row on the other side.
-        t_m.min(staggered_m(t_x_m - going.shift_m + advance_m, self.t_y_m, uneven, going.shift_m))
+        [t_x_m, over_ground_mps * going.ping_period_s]
     }
 
     /// Returns the largest speed that solves T = hypot((v + w) t + shift + u a / v, T_y).

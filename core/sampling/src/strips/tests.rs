@@ -61,7 +61,7 @@ fn closed(target_m: f64, t_y_m: f64, gap_s: f64) -> f64 {
 #[test]
 fn wall_seen_by_all_heads_is_one_strip() {
     let one = strips(&[all_around(&[]), all_around(&[])]);
-    let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), hidden: false, wait: 1.0 };
+    let whole = Strip { arc: arc(0.0, 30.0), seen_by: HeadSet::first(2), set: 0, hidden: false, wait: 1.0 };
     assert_eq!(one.as_slice(), [whole]);
     assert!((one.largest_step_m(0) - 0.2).abs() < 1e-9);
     let v = speed(&one, &turning(2), 0.5).unwrap();

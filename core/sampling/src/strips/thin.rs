@@ -3,58 +3,32 @@
 use crate::head::HeadSet;
 use crate::passes::Passes;
 
-/// Number of head sets for which the longest time between passes is stored.
+/// Number of head sets for which the longest time between passes is kept. For other sets, it is computed again.
 ///
 /// More sets are rare, because a strip is usually hidden from only one or two heads.
 const SETS: usize = 8;
-/// Number of strips whose head set is cached; for other strips, the time between passes is computed again.
-const STRIPS: usize = 64;
-/// Index that stands for a head set that is not stored.
-const NOT_KEPT: u8 = u8::MAX;
 
 /// Longest time between passes over each strip, and detection of thin strips.
 ///
 /// A thin strip is passed less often than the strip that is passed most often.
 pub(super) struct Thin<'a> {
     passes: &'a Passes,
-    /// Head sets, each with its longest time between passes, s. Many strips share a set, because the same heads see
-    /// them.
-    sets: [(HeadSet, Option<f64>); SETS],
-    set_of: [u8; STRIPS],
+    /// Longest time between passes of each head set, s.
+    gaps_s: [Option<f64>; SETS],
     best_s: f64,
 }
 
 impl<'a> Thin<'a> {
-    /// Creates the detection of thin strips; `strips` lists the heads that see each strip.
-    pub(super) fn of(passes: &'a Passes, strips: impl Iterator<Item = HeadSet>) -> Self {
-        let mut thin = Self {
-            passes,
-            sets: [(HeadSet::default(), None); SETS],
-            set_of: [NOT_KEPT; STRIPS],
-            best_s: f64::INFINITY,
-        };
-        let mut count = 0;
-        for (k, seen_by) in strips.enumerate() {
-            let known = thin.sets.iter().take(count).position(|(set, _)| *set == seen_by);
-            let number = match (known, thin.sets.get_mut(count)) {
-                (Some(number), _) => Some(number),
-                (None, Some(slot)) => {
-                    *slot = (seen_by, passes.gap_s(seen_by));
-                    count += 1;
-                    Some(count - 1)
-                }
-                (None, None) => None,
-            };
-            let number = number.and_then(|number| u8::try_from(number).ok()).unwrap_or(NOT_KEPT);
-            if let Some(set_of) = thin.set_of.get_mut(k) {
-                *set_of = number;
+    /// Creates the detection of thin strips; `sets` lists the different sets of heads that see a strip.
+    pub(super) fn of(passes: &'a Passes, sets: &[HeadSet]) -> Self {
+        let mut thin = Self { passes, gaps_s: [None; SETS], best_s: f64::INFINITY };
+        for (number, seen_by) in sets.iter().enumerate() {
+            let gap_s = passes.gap_s(*seen_by);
+            if let Some(slot) = thin.gaps_s.get_mut(number) {
+                *slot = gap_s;
             }
-            if number == NOT_KEPT {
-                thin.best_s = passes.gap_s(seen_by).map_or(thin.best_s, |gap_s| thin.best_s.min(gap_s));
-            }
+            thin.best_s = thin.best_s.min(gap_s.unwrap_or(f64::INFINITY));
         }
-        let gaps_s = thin.sets.iter().take(count).filter_map(|(_, gap_s)| *gap_s);
-        thin.best_s = gaps_s.fold(thin.best_s, f64::min);
         thin
     }
 
@@ -63,10 +37,10 @@ impl<'a> Thin<'a> {
         self.best_s
     }
 
-    /// Time between passes over the strip `k`, s; `None` if no head sees the strip.
-    pub(super) fn gap_s(&self, k: usize, seen_by: HeadSet) -> Option<f64> {
-        let kept = self.set_of.get(k).and_then(|number| self.sets.get(usize::from(*number)));
-        kept.map_or_else(|| self.passes.gap_s(seen_by), |(_, gap_s)| *gap_s)
+    /// Time between passes over a strip, s; `None` if no head sees the strip. `set` is the index of the set `seen_by`.
+    pub(super) fn gap_s(&self, set: u8, seen_by: HeadSet) -> Option<f64> {
+        let kept = self.gaps_s.get(usize::from(set)).copied();
+        kept.unwrap_or_else(|| self.passes.gap_s(seen_by))
     }
 
     /// Longest time, s, that `needed` successive passes over a strip take; see [`Passes::time_for_s`].
@@ -85,7 +59,7 @@ impl<'a> Thin<'a> {
     }
 
     /// Whether a strip is passed as often as the strip that is passed most often.
-    pub(super) fn is_full(&self, k: usize, seen_by: HeadSet) -> bool {
-        self.gap_s(k, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)
+    pub(super) fn is_full(&self, set: u8, seen_by: HeadSet) -> bool {
+        self.gap_s(set, seen_by).is_some_and(|gap_s| gap_s <= self.best_s)
     }
 }
