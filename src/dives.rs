@@ -67,7 +67,9 @@ pub(crate) fn dives(args: &Dives) -> Result<u8, Failure> {
     } else {
         say(&table(dives.iter().map(Dive::row)));
         dives.iter().flat_map(Dive::advice).for_each(|text| say(&one_line(&text)));
-        unreadable.iter().for_each(|(log, error)| say(&one_line(&format!("{}: {error}", log.display()))));
+        for (log, error) in &unreadable {
+            say(&one_line(&format!("{}: {error}", log.display())));
+        }
     }
     Ok(if unreadable.is_empty() { failure::OK } else { failure::DATA_LOST })
 }
