@@ -39,6 +39,8 @@ pub(super) struct Results {
     pub(super) disk: Disk,
     /// Number of spare cores, and number of cores; `None` if the system doesn't report it.
     pub(super) cpu: Option<(f64, usize)>,
+    /// Whether the test was ended before its time.
+    pub(super) is_interrupted: bool,
     /// UTC according to the computer, seconds.
     pub(super) utc_s: f64,
 }
@@ -56,6 +58,13 @@ pub(super) struct SensorResult {
     /// Whether a sonar found no echo.
     pub(super) without_echo: bool,
     pub(super) faults: Vec<Fault>,
+}
+
+impl SensorResult {
+    /// Longest allowed time without a reading. A slow device may miss two readings.
+    pub(super) fn most_gap(&self) -> DurNs {
+        DurNs::from_secs_f64(SILENT_AFTER.as_secs_f64().max(3.0 / self.expected_hz))
+    }
 }
 
 /// Noise of a quantity at rest.
@@ -130,6 +139,7 @@ pub(super) fn run(
     });
     drop(progress);
     let end = headrace_ports::now();
+    let is_interrupted = end < begun + duration;
     let cpu = CpuTimes::read().zip(cpu).map(|(after, before)| after.spare_since(&before));
     let disk = disk.end();
     let report = dive.end_live(supervisor, &mut watch);
@@ -145,7 +155,7 @@ pub(super) fn run(
         let expected_hz = expected::rate_hz(device.as_ref(), head, vehicle.site);
         sensors.push(test.result(source, status.as_ref(), (device.sense(), expected_hz), readings));
     }
-    Ok(Results { sensors, disk, cpu, utc_s: utc.0 as f64 / 1e9 })
+    Ok(Results { sensors, disk, cpu, is_interrupted, utc_s: utc.0 as f64 / 1e9 })
 }
 
 /// The vehicle, and the end of its test.
@@ -198,8 +208,8 @@ fn faults(result: &SensorResult, source: &SourceReport, status: Option<&Status>)
     let mut add = |word, problem: String, action: &str| faults.push(Fault::new(word, problem, action));
     if !is_running {
         add("LOST", words, power);
-    } else if gap > SILENT_AFTER {
-        let most_s = SILENT_AFTER.as_secs_f64();
+    } else if gap > result.most_gap() {
+        let most_s = result.most_gap().as_secs_f64();
         add("GAP", format!("no reading for {:.1} s; allowed are {most_s} s", gap.as_secs_f64()), power);
     }
     let (rate_hz, expected_hz) = (result.rate_hz, result.expected_hz);
