@@ -210,6 +210,7 @@ mod tests {
             rate_hz,
             expected_hz: 100.0,
             gap: (!is_silent).then_some(DurNs(31_000_000)),
+            late: DurNs(0),
             noises,
             clock: None,
             without_echo: false,

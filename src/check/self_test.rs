@@ -11,7 +11,7 @@ use headrace_monitor::report::{DeviceClockReport, SourceReport};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Phase, Status};
 use headrace_sampling::head::SILENT_AFTER;
-use headrace_sensor::device::Sense;
+use headrace_sensor::device::{Device, Sense, SensorKind};
 use headrace_sensor::device_clock::MOST_DRIFT;
 use headrace_vehicle::VehicleConfig;
 
@@ -33,6 +33,9 @@ const MOST_NOISE: f64 = 3.0;
 /// Largest share of damaged frames. On a sound line, there are none.
 const MOST_DAMAGED: f64 = 0.01;
 
+/// Longest time until a sensor's first reading, as the default of `--require-within`.
+const MOST_LATE: DurNs = DurNs(30_000_000_000);
+
 /// Results of a self-test.
 pub(super) struct Results {
     pub(super) sensors: Vec<SensorResult>,
@@ -53,6 +56,8 @@ pub(super) struct SensorResult {
     pub(super) expected_hz: f64,
     /// Longest time without a reading; `None` without readings.
     pub(super) gap: Option<DurNs>,
+    /// Time until the first reading.
+    pub(super) late: DurNs,
     pub(super) noises: Vec<Noise>,
     pub(super) clock: Option<DeviceClockReport>,
     /// Whether a sonar found no echo.
@@ -93,6 +98,8 @@ impl Fault {
 struct ReadingsKeeper {
     readings: Rc<RefCell<Vec<SensorReadings>>>,
     site: Site,
+    /// Least confidence of each sensor's ranges that navigation uses.
+    least_confidences: Vec<f64>,
 }
 
 impl Follower for ReadingsKeeper {
@@ -100,7 +107,8 @@ impl Follower for ReadingsKeeper {
         let mut readings = self.readings.borrow_mut();
         for event in dive.view().readings() {
             if let Some(sensor) = readings.get_mut(event.source.index()) {
-                sensor.add(event, self.site);
+                let least = self.least_confidences.get(event.source.index()).copied();
+                sensor.add(event, self.site, least.unwrap_or(0.0));
             }
         }
     }
@@ -117,13 +125,19 @@ pub(super) fn run(
     folder: &Path,
 ) -> Result<Results, Failure> {
     let readings = Rc::new(RefCell::new(vec![SensorReadings::default(); vehicle.sensors.len()]));
-    let keeper = ReadingsKeeper { readings: Rc::clone(&readings), site: vehicle.site };
+    let least = |device: &Box<dyn Device>| match device.specification().kind {
+        SensorKind::Echosounder { min_confidence } => min_confidence,
+        _ => 0.0,
+    };
+    let least_confidences = vehicle.sensors.iter().map(least).collect();
+    let keeper = ReadingsKeeper { readings: Rc::clone(&readings), site: vehicle.site, least_confidences };
     let mut dive = Assembly::of(vehicle, text).kept(true).assemble()?;
     let interrupted = interrupt::flag()?;
-    let disk = DiskTest::start(folder)?;
-    let cpu = CpuTimes::read();
     let begun = headrace_ports::now();
     let supervisor = live::supervisor(&mut dive, vehicle, begun)?;
+    // The disk's test begins last, so that no error leaves its file behind.
+    let disk = DiskTest::start(folder)?;
+    let cpu = CpuTimes::read();
     let ended = || interrupted.load(Ordering::Relaxed) || headrace_ports::now() >= begun + duration;
     let mut statuses: Vec<Option<Status>> = vec![None; vehicle.sensors.len()];
     let mut watch = Watch::quiet().followed_by(Box::new(keeper));
@@ -144,7 +158,7 @@ pub(super) fn run(
     let disk = disk.end();
     let report = dive.end_live(supervisor, &mut watch);
     let (_, utc) = headrace_ports::clock_anchor();
-    let test = Test { vehicle, text, end };
+    let test = Test { vehicle, text, begun, end };
     let programs = &mut vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let mut sensors = Vec::new();
     let measured = readings.borrow();
@@ -162,6 +176,7 @@ pub(super) fn run(
 struct Test<'a> {
     vehicle: &'a VehicleConfig,
     text: &'a str,
+    begun: MonoNs,
     end: MonoNs,
 }
 
@@ -185,6 +200,7 @@ impl Test<'_> {
             rate_hz: main.map_or(0.0, Series::rate_hz),
             expected_hz,
             gap: main.map(|series| series.longest_gap(self.end)),
+            late: main.map_or(DurNs(0), |series| series.first.since(self.begun)),
             without_echo: is_sonar && main.is_some_and(|series| !series.has_values()),
             noises,
             clock: source.device_clock.clone(),
@@ -206,6 +222,10 @@ fn faults(result: &SensorResult, source: &SourceReport, status: Option<&Status>)
     };
     let mut faults = Vec::new();
     let mut add = |word, problem: String, action: &str| faults.push(Fault::new(word, problem, action));
+    if result.late > MOST_LATE {
+        let (late_s, most_s) = (result.late.as_secs_f64(), MOST_LATE.as_secs_f64());
+        add("LATE", format!("its first reading came after {late_s:.0} s; allowed are {most_s} s"), power);
+    }
     if !is_running {
         add("LOST", words, power);
     } else if gap > result.most_gap() {
@@ -218,6 +238,10 @@ fn faults(result: &SensorResult, source: &SourceReport, status: Option<&Status>)
         add("SLOW", problem, "set the device's rate, or its rate in the vehicle file");
     }
     let frames = source.frames + source.bad_frames;
+    let dropped = source.line.as_ref().map_or(0, |line| line.dropped_packets);
+    if dropped > 0 {
+        add("DROPS", format!("{dropped} packets were dropped"), "end other programs; check the network");
+    }
     if source.bad_frames as f64 > MOST_DAMAGED * frames as f64 {
         let problem = format!("{} of {frames} frames are damaged", source.bad_frames);
         add("DAMAGED", problem, "check cable, interference and baud rate");
