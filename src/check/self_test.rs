@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alert_list::{AlertState, ListedAlertJson};
 use headrace_monitor::report::{DeviceClockReport, SourceReport};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Phase, Status};
@@ -33,6 +34,8 @@ const MOST_NOISE: f64 = 3.0;
 /// Largest share of damaged frames. On a sound line, there are none.
 const MOST_DAMAGED: f64 = 0.01;
 
+/// Alerts about a sensor whose readings don't change.
+const STUCK: [&str; 2] = ["sensor_stalled", "sensor_hung"];
 /// Longest time until a sensor's first reading, as the default of `--require-within`.
 const MOST_LATE: DurNs = DurNs(30_000_000_000);
 
@@ -125,11 +128,11 @@ pub(super) fn run(
     folder: &Path,
 ) -> Result<Results, Failure> {
     let readings = Rc::new(RefCell::new(vec![SensorReadings::default(); vehicle.sensors.len()]));
-    let least = |device: &Box<dyn Device>| match device.specification().kind {
+    let least = |device: &dyn Device| match device.specification().kind {
         SensorKind::Echosounder { min_confidence } => min_confidence,
         _ => 0.0,
     };
-    let least_confidences = vehicle.sensors.iter().map(least).collect();
+    let least_confidences = vehicle.sensors.iter().map(|device| least(device.as_ref())).collect();
     let keeper = ReadingsKeeper { readings: Rc::clone(&readings), site: vehicle.site, least_confidences };
     let mut dive = Assembly::of(vehicle, text).kept(true).assemble()?;
     let interrupted = interrupt::flag()?;
@@ -167,7 +170,14 @@ pub(super) fn run(
     {
         let head = device.head().and_then(|_| programs.next());
         let expected_hz = expected::rate_hz(device.as_ref(), head, vehicle.site);
-        sensors.push(test.result(source, status.as_ref(), (device.sense(), expected_hz), readings));
+        let mut result = test.result(source, status.as_ref(), (device.sense(), expected_hz), readings);
+        let is_stuck = |alert: &&ListedAlertJson| {
+            let is_active = alert.state == AlertState::Active && STUCK.contains(&alert.kind);
+            is_active && alert.sensor.as_ref() == Some(&source.id)
+        };
+        let stuck = report.alert_list.iter().filter(is_stuck);
+        result.faults.extend(stuck.map(|alert| Fault::new("STUCK", alert.text.clone(), &alert.advice)));
+        sensors.push(result);
     }
     Ok(Results { sensors, disk, cpu, is_interrupted, utc_s: utc.0 as f64 / 1e9 })
 }

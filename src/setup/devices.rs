@@ -271,7 +271,7 @@ impl Probed {
     /// Shows the doubtful devices, and how to add them.
     fn show_doubtful(&self) {
         for FoundDevice { plugin, connect, identity, keys, .. } in &self.doubtful {
-            let keys: String = keys.lines().map(|line| format!(",{}", line.replace(" = ", "="))).collect();
+            let keys = keys.lines().fold(String::new(), |keys, line| keys + "," + &line.replace(" = ", "="));
             left_out(
                 connect,
                 &format!(
