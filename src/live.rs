@@ -1,7 +1,7 @@
 //! `headrace run` on real ports: connections, drivers, and the state of each sensor.
 
 use std::cell::{Cell, RefCell};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -9,6 +9,7 @@ use headrace_dashboard::Mode;
 use headrace_geometry::time::{DiveClock, DurNs, MonoNs};
 use headrace_ports::{Connection, LineRecord, Phase, Status, Supervisor};
 use headrace_replay::log::part_path;
+use headrace_replay::saved_state::SavedState;
 use headrace_sensor::connect::{Connect, ConnectError};
 use headrace_sensor::driver::DriverSetup;
 use headrace_vehicle::{Grade, VehicleConfig};
@@ -57,9 +58,8 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     let (is_served, recording_is_on) = (page::is_wanted(&args.page, true), recording.is_some());
     let mut dive =
         Assembly::of(vehicle, text).recorded(recording).kept(is_served).assemble()?.operated(Clock::Ours);
-    // After a restart, the recordings may come in another order. The smallest path is chosen, so that the saved states
-    // stay beside the same recording.
-    if let (Some(log), true) = (logs.iter().min(), recording_is_on) {
+    // After a restart, the recordings come in another order. The states stay beside the first one on the command line.
+    if let (Some(log), true) = (logs.iter().min_by_key(|log| place(log, &args.record)), recording_is_on) {
         dive.keep_states(log);
     }
     let rebuild = resuming.as_ref().map(|resuming| resuming.begin(vehicle, &mut dive)).transpose()?;
@@ -118,6 +118,10 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
     until.set(args.duration.map(|seconds| headrace_ports::now() + DurNs::from_secs_f64(seconds)));
     dive.run_live(&supervisor, &ended, &mut watch, &mut beside);
     let mut report = dive.end_live(supervisor, &mut watch);
+    // If the first medium was missing for a while, there are states beside other recordings, too.
+    for log in logs.iter().filter(|_| recording_is_on) {
+        drop(std::fs::remove_file(SavedState::path(log)));
+    }
     state_utc(&mut report, Some(utc_of_zero_s()));
     if let Some(served) = served {
         served.end(&report);
@@ -127,6 +131,14 @@ pub(crate) fn run(args: &Run, text: &str, vehicle: &VehicleConfig, claims: Claim
         Some(why) => Err(Failure::Required(why)),
         None => Ok(code),
     }
+}
+
+/// Place of a recording on the command line, by its path and then by its folder. A dive that goes on may have another
+/// name than the given one.
+fn place(log: &Path, given: &[PathBuf]) -> [usize; 2] {
+    let by_path = given.iter().position(|given| given == log);
+    let by_folder = given.iter().position(|given| given.parent() == log.parent());
+    [by_path, by_folder].map(|place| place.unwrap_or(given.len()))
 }
 
 /// UTC of the zero of this machine's clock, seconds.
@@ -302,5 +314,23 @@ impl SensorStates {
             self.ids.get(number)?,
             self.words.get(number)?
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_are_beside_the_first_recording_on_the_command_line() {
+        let given = ["dive.mcap", "/media/stick/dive.mcap", "/media/stick/second.mcap"].map(PathBuf::from);
+        let first = |logs: &[&'static str]| {
+            let logs = logs.iter().copied().map(Path::new);
+            logs.min_by_key(|log| place(log, &given)).unwrap()
+        };
+        assert_eq!(first(&["/media/stick/dive.mcap", "dive.mcap"]), Path::new("dive.mcap"));
+        assert_eq!(first(&["/media/stick/dive-1.mcap", "dive-1.mcap"]), Path::new("dive-1.mcap"));
+        let both = ["/media/stick/second.mcap", "/media/stick/dive.mcap"];
+        assert_eq!(first(&both), Path::new("/media/stick/dive.mcap"));
     }
 }

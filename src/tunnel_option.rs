@@ -39,6 +39,14 @@ pub(crate) fn line(key: &str, value: &str) -> String {
     format!("{} = {value}\n", key.trim())
 }
 
+/// Beginning of the line with the tunnel's length.
+pub(crate) const LENGTH: &str = "length_m = ";
+
+/// Length of the tunnel, metres, as the text of its key; `None` without the key.
+pub(crate) fn length(text: &str) -> Option<String> {
+    table(text).lines().find_map(|line| line.strip_prefix(LENGTH)).map(str::to_owned)
+}
+
 /// File that describes the tunnel; `None` if it isn't read from a file.
 pub(crate) fn file(text: &str) -> Option<PathBuf> {
     let name = text.split(',').next().map(str::trim);

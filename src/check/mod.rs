@@ -64,6 +64,11 @@ pub(crate) fn best_mode(vehicle: VehicleConfig, text: &str) -> Option<(&'static 
     Readable::new(vehicle, ("vehicle.toml", text), &mut Vec::new()).outlook?.best_mode()
 }
 
+/// Mode that all of the vehicle's heads have, and as in [`best_mode`] its speed. `None` if their modes differ.
+pub(crate) fn planned_mode(vehicle: VehicleConfig, text: &str) -> Option<(&'static str, f64)> {
+    Readable::new(vehicle, ("vehicle.toml", text), &mut Vec::new()).outlook?.own_mode()
+}
+
 /// Runs `headrace check`.
 pub(crate) fn check(args: &Check) -> Result<u8, Failure> {
     let (name, text) = (args.file.display().to_string(), files::read(&args.file)?);

@@ -96,8 +96,12 @@ impl Outlook {
 
     /// The mode with the largest speed, and this speed less a margin for heads out of phase, m/s.
     pub(super) fn best_mode(&self) -> Option<(&'static str, f64)> {
-        let best = self.best.as_ref()?;
-        Some((best.mode, down(HELD_SHARE * best.v_max_mps?)))
+        planned(self.best.as_ref()?)
+    }
+
+    /// The mode to which all heads are set, and its largest speed less the same margin, m/s.
+    pub(super) fn own_mode(&self) -> Option<(&'static str, f64)> {
+        planned(self.own.as_ref()?)
     }
 
     /// Problems that the plan reveals.
@@ -210,7 +214,12 @@ impl Outlook {
     }
 }
 
-/// An arbitrary speed, m/s, for results that are the same at every speed.
+/// Mode of an answer, and its largest speed less a margin, m/s.
+fn planned(answer: &Answer) -> Option<(&'static str, f64)> {
+    Some((answer.mode, down(HELD_SHARE * answer.v_max_mps?)))
+}
+
+/// Arbitrary speed for results that don't depend on the speed, m/s.
 const ANY_SPEED_MPS: f64 = 0.1;
 
 /// A speed rounded down to 1 mm/s. The printed speed thus meets the target, too.

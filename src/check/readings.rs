@@ -47,7 +47,7 @@ impl Quantity {
 #[derive(Debug, Clone)]
 pub(super) struct Series {
     count: u64,
-    first: MonoNs,
+    pub(super) first: MonoNs,
     last: MonoNs,
     longest_gap: DurNs,
     /// Latest value of each channel. A channel is an axis of a vector, or a direction of a head.
@@ -91,9 +91,12 @@ impl Series {
 pub(super) struct SensorReadings(pub(super) BTreeMap<Quantity, Series>);
 
 impl SensorReadings {
-    /// Adds a reading.
-    pub(super) fn add(&mut self, event: &Event, site: Site) {
-        let (quantity, values) = values(&event.reading, site);
+    /// Adds a reading. The range of an echo with less confidence than `least_confidence` is no value.
+    pub(super) fn add(&mut self, event: &Event, site: Site, least_confidence: f64) {
+        let (quantity, mut values) = values(&event.reading, site);
+        if matches!(event.reading, Reading::Echo(echo) if echo.confidence < least_confidence) {
+            values = [None; 3];
+        }
         let at = event.received;
         let series = self.0.entry(quantity).or_insert_with(|| Series {
             count: 0,
@@ -157,7 +160,7 @@ mod tests {
                 temperature_degc: 10.0,
             };
             let reading = Reading::Pressure(water);
-            readings.add(&Event { source: SourceId(0), received: at, valid_at: at, reading }, site);
+            readings.add(&Event { source: SourceId(0), received: at, valid_at: at, reading }, site, 0.0);
         }
         readings
     }

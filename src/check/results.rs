@@ -3,7 +3,6 @@
 use headrace_config::plain::one_line;
 use headrace_geometry::time::DurNs;
 use headrace_replay::log::WARN_BELOW_BYTES;
-use headrace_sampling::head::SILENT_AFTER;
 use headrace_sensor::device_clock::MOST_DRIFT;
 use serde_json::{Value, json};
 
@@ -22,6 +21,10 @@ impl Results {
     /// of sensors.
     fn faults(&self) -> Vec<(&str, Fault)> {
         let mut faults = self.disk_faults();
+        if self.is_interrupted {
+            let problem = "it was ended before its time".to_owned();
+            faults.push(("test", Fault::new("ENDED", problem, "repeat it")));
+        }
         if let Some((spare, _)) = self.cpu.filter(|(spare, _)| *spare < LEAST_SPARE) {
             let problem = format!("{spare:.2} cores are spare; needed are {LEAST_SPARE}");
             faults.push(("CPU", Fault::new("BUSY", problem, "end other programs")));
@@ -152,7 +155,7 @@ fn table(rows: &[[String; 6]]) -> String {
 /// Row of a sensor.
 fn row(sensor: &SensorResult) -> [String; 6] {
     let gap = sensor.gap.map_or("-".to_owned(), |gap| {
-        format!("{:.2} s ({} s)", gap.as_secs_f64(), SILENT_AFTER.as_secs_f64())
+        format!("{:.2} s ({} s)", gap.as_secs_f64(), sensor.most_gap().as_secs_f64())
     });
     let clock = sensor.clock.as_ref().and_then(|clock| clock.drift_ppm.zip(clock.drift_sd_ppm));
     let clock = clock.map(|(ppm, sd_ppm)| format!("{ppm:+.0}, sd {sd_ppm:.0} ppm ({:.0})", MOST_DRIFT * 1e6));
@@ -208,6 +211,7 @@ mod tests {
             rate_hz,
             expected_hz: 100.0,
             gap: (!is_silent).then_some(DurNs(31_000_000)),
+            late: DurNs(0),
             noises,
             clock: None,
             without_echo: false,
@@ -234,7 +238,7 @@ mod tests {
 
     fn results(sensors: Vec<SensorResult>, syncs: io::Result<[DurNs; 2]>, spare: f64) -> Results {
         let disk = Disk { syncs, free_bytes: Some(34 << 30) };
-        Results { sensors, disk, cpu: Some((spare, 4)), utc_s: 1_796_000_000.0 }
+        Results { sensors, disk, cpu: Some((spare, 4)), is_interrupted: false, utc_s: 1_796_000_000.0 }
     }
 
     #[test]
@@ -252,6 +256,24 @@ mod tests {
         time  2026-11-30T00:53:20Z, on this computer; reports state it
         ready to dive
         ");
+    }
+
+    #[test]
+    fn interrupted_test_is_a_fault() {
+        let results = results(vec![imu()], Ok([DurNs(3_000_000), DurNs(41_000_000)]), 3.4);
+        let interrupted = Results { is_interrupted: true, ..results };
+        assert!(!interrupted.is_ready());
+        assert!(
+            interrupted
+                .text()
+                .contains("not ready to dive:\n  test: it was ended before its time: repeat it")
+        );
+    }
+
+    #[test]
+    fn gap_limit_of_a_slow_device_is_three_readings() {
+        let slow = SensorResult { expected_hz: 0.2, ..imu() };
+        assert_eq!([slow.most_gap(), imu().most_gap()], [DurNs(15_000_000_000), DurNs(2_000_000_000)]);
     }
 
     #[test]

@@ -7,11 +7,12 @@ use std::sync::atomic::Ordering;
 
 use headrace_geometry::site::Site;
 use headrace_geometry::time::{DurNs, MonoNs};
+use headrace_monitor::alert_list::{AlertState, ListedAlertJson};
 use headrace_monitor::report::{DeviceClockReport, SourceReport};
 use headrace_monitor::run::Loop;
 use headrace_ports::{Phase, Status};
 use headrace_sampling::head::SILENT_AFTER;
-use headrace_sensor::device::Sense;
+use headrace_sensor::device::{Device, Sense, SensorKind};
 use headrace_sensor::device_clock::MOST_DRIFT;
 use headrace_vehicle::VehicleConfig;
 
@@ -35,12 +36,19 @@ const MOST_NOISE: f64 = 3.0;
 /// Largest allowed share of damaged frames. A sound line has no damaged frames.
 const MOST_DAMAGED: f64 = 0.01;
 
+/// Alerts about a sensor whose readings don't change.
+const STUCK: [&str; 2] = ["sensor_stalled", "sensor_hung"];
+/// Longest time until a sensor's first reading, as the default of `--require-within`.
+const MOST_LATE: DurNs = DurNs(30_000_000_000);
+
 /// Results of a self-test.
 pub(super) struct Results {
     pub(super) sensors: Vec<SensorResult>,
     pub(super) disk: Disk,
     /// Number of spare cores, and number of cores; `None` if the system doesn't report it.
     pub(super) cpu: Option<(f64, usize)>,
+    /// Whether the test was ended before its time.
+    pub(super) is_interrupted: bool,
     /// UTC according to the computer, seconds.
     pub(super) utc_s: f64,
 }
@@ -53,11 +61,20 @@ pub(super) struct SensorResult {
     pub(super) expected_hz: f64,
     /// Longest time without a reading; `None` without readings.
     pub(super) gap: Option<DurNs>,
+    /// Time until the first reading.
+    pub(super) late: DurNs,
     pub(super) noises: Vec<Noise>,
     pub(super) clock: Option<DeviceClockReport>,
     /// Whether a sonar found no echo.
     pub(super) without_echo: bool,
     pub(super) faults: Vec<Fault>,
+}
+
+impl SensorResult {
+    /// Longest allowed time without a reading. A slow device may miss two readings.
+    pub(super) fn most_gap(&self) -> DurNs {
+        DurNs::from_secs_f64(SILENT_AFTER.as_secs_f64().max(3.0 / self.expected_hz))
+    }
 }
 
 /// Noise of a quantity at rest.
@@ -86,6 +103,8 @@ impl Fault {
 struct ReadingsKeeper {
     readings: Rc<RefCell<Vec<SensorReadings>>>,
     site: Site,
+    /// Least confidence of each sensor's ranges that navigation uses.
+    least_confidences: Vec<f64>,
 }
 
 impl Follower for ReadingsKeeper {
@@ -93,7 +112,8 @@ impl Follower for ReadingsKeeper {
         let mut readings = self.readings.borrow_mut();
         for event in dive.view().readings() {
             if let Some(sensor) = readings.get_mut(event.source.index()) {
-                sensor.add(event, self.site);
+                let least = self.least_confidences.get(event.source.index()).copied();
+                sensor.add(event, self.site, least.unwrap_or(0.0));
             }
         }
     }
@@ -110,13 +130,19 @@ pub(super) fn run(
     folder: &Path,
 ) -> Result<Results, Failure> {
     let readings = Rc::new(RefCell::new(vec![SensorReadings::default(); vehicle.sensors.len()]));
-    let keeper = ReadingsKeeper { readings: Rc::clone(&readings), site: vehicle.site };
+    let least = |device: &dyn Device| match device.specification().kind {
+        SensorKind::Echosounder { min_confidence } => min_confidence,
+        _ => 0.0,
+    };
+    let least_confidences = vehicle.sensors.iter().map(|device| least(device.as_ref())).collect();
+    let keeper = ReadingsKeeper { readings: Rc::clone(&readings), site: vehicle.site, least_confidences };
     let mut dive = Assembly::of(vehicle, text).kept(true).assemble()?;
     let interrupted = interrupt::flag()?;
-    let disk = DiskTest::start(folder)?;
-    let cpu = CpuTimes::read();
     let begun = headrace_ports::now();
     let supervisor = live::supervisor(&mut dive, vehicle, begun)?;
+    // The disk's test begins last, so that no error leaves its file behind.
+    let disk = DiskTest::start(folder)?;
+    let cpu = CpuTimes::read();
     let ended = || interrupted.load(Ordering::Relaxed) || headrace_ports::now() >= begun + duration;
     let mut statuses: Vec<Option<Status>> = vec![None; vehicle.sensors.len()];
     let mut watch = Watch::quiet().followed_by(Box::new(keeper));
@@ -132,11 +158,12 @@ pub(super) fn run(
     });
     drop(progress);
     let end = headrace_ports::now();
+    let is_interrupted = end < begun + duration;
     let cpu = CpuTimes::read().zip(cpu).map(|(after, before)| after.spare_since(&before));
     let disk = disk.end();
     let report = dive.end_live(supervisor, &mut watch);
     let (_, utc) = headrace_ports::clock_anchor();
-    let test = Test { vehicle, text, end };
+    let test = Test { vehicle, text, begun, end };
     let programs = &mut vehicle.programs().map_err(Failure::Plan)?.into_iter();
     let mut sensors = Vec::new();
     let measured = readings.borrow();
@@ -145,15 +172,23 @@ pub(super) fn run(
     {
         let head = device.head().and_then(|_| programs.next());
         let expected_hz = expected::rate_hz(device.as_ref(), head, vehicle.site);
-        sensors.push(test.result(source, status.as_ref(), (device.sense(), expected_hz), readings));
+        let mut result = test.result(source, status.as_ref(), (device.sense(), expected_hz), readings);
+        let is_stuck = |alert: &&ListedAlertJson| {
+            let is_active = alert.state == AlertState::Active && STUCK.contains(&alert.kind);
+            is_active && alert.sensor.as_ref() == Some(&source.id)
+        };
+        let stuck = report.alert_list.iter().filter(is_stuck);
+        result.faults.extend(stuck.map(|alert| Fault::new("STUCK", alert.text.clone(), &alert.advice)));
+        sensors.push(result);
     }
-    Ok(Results { sensors, disk, cpu, utc_s: utc.0 as f64 / 1e9 })
+    Ok(Results { sensors, disk, cpu, is_interrupted, utc_s: utc.0 as f64 / 1e9 })
 }
 
 /// The vehicle, and the end of its test.
 struct Test<'a> {
     vehicle: &'a VehicleConfig,
     text: &'a str,
+    begun: MonoNs,
     end: MonoNs,
 }
 
@@ -177,6 +212,7 @@ impl Test<'_> {
             rate_hz: main.map_or(0.0, Series::rate_hz),
             expected_hz,
             gap: main.map(|series| series.longest_gap(self.end)),
+            late: main.map_or(DurNs(0), |series| series.first.since(self.begun)),
             without_echo: is_sonar && main.is_some_and(|series| !series.has_values()),
             noises,
             clock: source.device_clock.clone(),
@@ -198,10 +234,14 @@ fn faults(result: &SensorResult, source: &SourceReport, status: Option<&Status>)
     };
     let mut faults = Vec::new();
     let mut add = |word, problem: String, action: &str| faults.push(Fault::new(word, problem, action));
+    if result.late > MOST_LATE {
+        let (late_s, most_s) = (result.late.as_secs_f64(), MOST_LATE.as_secs_f64());
+        add("LATE", format!("its first reading came after {late_s:.0} s; allowed are {most_s} s"), power);
+    }
     if !is_running {
         add("LOST", words, power);
-    } else if gap > SILENT_AFTER {
-        let most_s = SILENT_AFTER.as_secs_f64();
+    } else if gap > result.most_gap() {
+        let most_s = result.most_gap().as_secs_f64();
         add("GAP", format!("no reading for {:.1} s; allowed are {most_s} s", gap.as_secs_f64()), power);
     }
     let (rate_hz, expected_hz) = (result.rate_hz, result.expected_hz);
@@ -210,6 +250,10 @@ fn faults(result: &SensorResult, source: &SourceReport, status: Option<&Status>)
         add("SLOW", problem, "set the device's rate, or its rate in the vehicle file");
     }
     let frames = source.frames + source.bad_frames;
+    let dropped = source.line.as_ref().map_or(0, |line| line.dropped_packets);
+    if dropped > 0 {
+        add("DROPS", format!("{dropped} packets were dropped"), "end other programs; check the network");
+    }
     if source.bad_frames as f64 > MOST_DAMAGED * frames as f64 {
         let problem = format!("{} of {frames} frames are damaged", source.bad_frames);
         add("DAMAGED", problem, "check cable, interference and baud rate");

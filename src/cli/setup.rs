@@ -29,8 +29,8 @@ pub(crate) struct Setup {
     /// given several times.
     #[arg(long, value_name = "[PLUGIN=]CONNECT[,KEY=VALUE]..", value_parser = GivenPort::parse)]
     pub(crate) port: Vec<GivenPort>,
-    /// Mount of a head or Ping: metres forward, left and up from the vehicle's origin, and its direction: ahead,
-    /// aft, left, right, up or down. May be given several times.
+    /// Mount of a device: metres forward, left and up from the vehicle's origin, and its direction: ahead, aft,
+    /// left, right, up or down. Instead: roll, pitch and yaw, degrees, at the origin. May be given several times.
     #[arg(long, value_name = "ID=X,Y,Z,DIRECTION", value_parser = mount_of)]
     pub(crate) mount: Vec<(String, [[f64; 3]; 2])>,
     /// Take the suggested answers instead of asking: CAN interfaces are inertial units, and the HID device
@@ -85,6 +85,8 @@ fn mount_of(text: &str) -> Result<(String, [[f64; 3]; 2]), String> {
 
 /// Largest coordinate of a sensor, m, as in a vehicle file.
 const FARTHEST_M: f64 = 20.0;
+/// Largest angle of a sensor, degrees, as in a vehicle file.
+const MOST_DEGREES: f64 = 360.0;
 /// Directions of a sensor's x axis, as roll, pitch and yaw in degrees.
 const DIRECTIONS: [(&str, [f64; 3]); 6] = [
     ("ahead", [0.0, 0.0, 0.0]),
@@ -95,11 +97,20 @@ const DIRECTIONS: [(&str, [f64; 3]); 6] = [
     ("down", [0.0, 90.0, 0.0]),
 ];
 
-/// Position, metres, and roll, pitch and yaw, degrees, of a sensor: `X,Y,Z,DIRECTION`.
+/// Position, metres, and roll, pitch and yaw, degrees, of a sensor: `X,Y,Z,DIRECTION`, or `ROLL,PITCH,YAW` at the origin.
 pub(crate) fn mount(text: &str) -> Result<[[f64; 3]; 2], String> {
     let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    if let [roll, pitch, yaw] = parts[..] {
+        let degrees = |part: &str| {
+            let degrees = part.parse().ok().filter(|degrees: &f64| degrees.abs() <= MOST_DEGREES);
+            degrees.ok_or_else(|| {
+                format!("{part:?} isn't a number from -{MOST_DEGREES} to {MOST_DEGREES} degrees")
+            })
+        };
+        return Ok([[0.0; 3], [degrees(roll)?, degrees(pitch)?, degrees(yaw)?]]);
+    }
     let [x, y, z, direction] = parts[..] else {
-        return Err("expected X,Y,Z,DIRECTION, such as 0.3,0,-0.1,ahead".to_owned());
+        return Err("expected X,Y,Z,DIRECTION, such as 0.3,0,-0.1,ahead, or ROLL,PITCH,YAW".to_owned());
     };
     let metres = |part: &str| {
         let metres = part.parse().ok().filter(|metres: &f64| metres.abs() <= FARTHEST_M);
@@ -120,7 +131,9 @@ mod tests {
     fn mounts_have_a_position_and_a_direction() {
         assert_eq!(mount("0.3, 0,-0.1,aft"), Ok([[0.3, 0.0, -0.1], [0.0, 0.0, 180.0]]));
         assert_eq!(mount("0,30,0,up"), Err("\"30\" isn't a number from -20 to 20 metres".to_owned()));
-        for text in ["", "0,0,0", "0,0,0,forwards", "0,nan,0,up"] {
+        assert_eq!(mount("180,0,-90.5"), Ok([[0.0; 3], [180.0, 0.0, -90.5]]));
+        assert_eq!(mount("0,0,361"), Err("\"361\" isn't a number from -360 to 360 degrees".to_owned()));
+        for text in ["", "0,0", "0,0,up", "0,0,0,forwards", "0,nan,0,up"] {
             assert!(mount(text).is_err(), "{text}");
         }
     }

@@ -44,15 +44,13 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
     let connections = live::connections(vehicle).into_iter().zip(&vehicle.sensor_configs);
     let sensors = connections.map(|((id, connect), config)| {
         let state = connect.map_err(|error| OpenError::unusable(&error)).and_then(|connect| {
-            let kind = probe_of(&config.plugin).filter(|_| probe);
+            let mut probes = if probe { probes_of(&config.plugin) } else { Vec::new() };
             match presence(machine, &connect)? {
                 Presence::There(name) => Ok(State::Present(name)),
                 // The device sends to a port of this machine, so it can't be probed.
                 Presence::Elsewhere if matches!(connect, Connect::UdpListen { .. }) => Ok(State::NotProbed),
-                Presence::Elsewhere => match kind {
-                    Some(kind) => headrace_ports::probe(&connect, &mut [kind]).map(State::Answered),
-                    None => Ok(State::NotProbed),
-                },
+                Presence::Elsewhere if probes.is_empty() => Ok(State::NotProbed),
+                Presence::Elsewhere => headrace_ports::probe(&connect, &mut probes).map(State::Answered),
             }
         });
         Sensor { id: id.to_owned(), connect: config.connect.clone(), state }
@@ -62,12 +60,12 @@ fn sensors(machine: &Machine, vehicle: &VehicleConfig, probe: bool) -> Vec<Senso
 
 /// The probes of all device kinds, in the order in which a port is probed.
 fn all_probes() -> Vec<Box<dyn Probe>> {
-    KINDS.iter().filter_map(|kind| kind.probe()).collect()
+    KINDS.iter().flat_map(|kind| kind.probes()).collect()
 }
 
-/// Probe of the device kind with this name in vehicle files; `None` if the kind has no probe.
-fn probe_of(name: &str) -> Option<Box<dyn Probe>> {
-    KINDS.iter().find(|kind| kind.name() == name)?.probe()
+/// Probes of the device kind with this name in vehicle files.
+fn probes_of(name: &str) -> Vec<Box<dyn Probe>> {
+    KINDS.iter().filter(|kind| kind.name() == name).flat_map(|kind| kind.probes()).collect()
 }
 
 /// Probes a serial port that may be opened; `None` for other ports.

@@ -5,7 +5,7 @@ use headrace_config::plain::one_line;
 use headrace_devices::KINDS;
 use headrace_geometry::frames::{Mount, Rot, Vec3};
 use headrace_geometry::time::DurNs;
-use headrace_ports::{Answer, Found, Machine, OpenError, discover};
+use headrace_ports::{Answer, Found, Machine, OpenError, discover, same_device};
 use headrace_sensor::SensorConfig;
 use headrace_sensor::connect::{Connect, UsbIdentity};
 use headrace_sensor::device::Device;
@@ -57,9 +57,24 @@ impl FoundDevice {
         Self { id: String::new(), plugin, connect, identity, keys }
     }
 
+    /// Value of a key of the device's kind, without quotation marks.
+    pub(super) fn value(&self, key: &str) -> Option<&str> {
+        let pairs = self.keys.lines().filter_map(|line| line.split_once(" = "));
+        pairs.filter(|(known, _)| *known == key).map(|(_, value)| value.trim_matches('"')).next()
+    }
+
     /// Whether the device's keys have this key.
     pub(super) fn has(&self, key: &str) -> bool {
-        self.keys.lines().any(|line| line.split(" = ").next() == Some(key))
+        self.value(key).is_some()
+    }
+
+    /// The device with further keys. They replace keys that it has.
+    fn with(mut self, keys: &[(String, String)]) -> Self {
+        let is_given = |line: &&str| keys.iter().any(|(key, _)| line.split(" = ").next() == Some(key));
+        let kept: String =
+            self.keys.lines().filter(|line| !is_given(line)).flat_map(|line| [line, "\n"]).collect();
+        self.keys = keys.iter().fold(kept, |kept, (key, value)| kept + &tunnel_option::line(key, value));
+        self
     }
 
     /// The device, configured by its own keys and by the lines `more`.
@@ -87,14 +102,16 @@ impl FoundDevice {
 pub(super) fn find(args: &Setup, questions: &mut Questions) -> Result<Vec<FoundDevice>, Failure> {
     let mut devices = Vec::new();
     for port in &args.port {
-        add(given(port)?, &mut devices, questions)?;
+        for device in given(port)? {
+            add(device, &mut devices, questions)?;
+        }
     }
     for found in discover(&Machine::ours()) {
         let is_given = |port: &GivenPort| found.connect.as_ref().is_some_and(|at| is_on(&port.connect, at));
         if args.port.iter().any(is_given) {
             continue;
         }
-        if let Some(device) = attached(&found, questions)? {
+        for device in attached(&found, questions)? {
             add(device, &mut devices, questions)?;
         }
     }
@@ -107,7 +124,11 @@ pub(super) fn find(args: &Setup, questions: &mut Questions) -> Result<Vec<FoundD
         let parse = |text: &str| if text.is_empty() { Ok(None) } else { GivenPort::parse(text).map(Some) };
         let Some(port) = questions.ask(&question, parse)?.flatten() else { break };
         match given(&port) {
-            Ok(device) => add(device, &mut devices, questions)?,
+            Ok(found) => {
+                for device in found {
+                    add(device, &mut devices, questions)?;
+                }
+            }
             Err(failure) => complain(&failure.to_string()),
         }
     }
@@ -152,36 +173,53 @@ fn id(plugin: &str, devices: &[FoundDevice]) -> String {
 /// Whether a connection uses the port or bus that was found.
 fn is_on(connect: &Connect, found: &str) -> bool {
     let text = connect.to_string();
-    text == found || found.strip_suffix("ADDRESS").is_some_and(|bus| text.starts_with(bus))
+    text == found
+        || found.strip_suffix("ADDRESS").is_some_and(|bus| text.starts_with(bus))
+        || Connect::parse(found).is_ok_and(|found| same_device(connect, &found))
 }
 
-/// The device on a port that the user names.
-fn given(port: &GivenPort) -> Result<FoundDevice, Failure> {
+/// The devices on a port that the user names.
+fn given(port: &GivenPort) -> Result<Vec<FoundDevice>, Failure> {
     let at = &port.connect;
-    let mut device = if let Some(plugin) = port.plugin {
-        FoundDevice::new(plugin, at.clone(), String::new())
+    let devices = if let Some(plugin) = port.plugin {
+        vec![FoundDevice::new(plugin, at.clone(), String::new())]
     } else {
-        let probed = (0..ATTEMPTS).find_map(|_| probe(at).transpose()).transpose();
-        let probed = probed.map_err(|error: OpenError| Failure::Required(format!("setup: {error}")))?;
-        probed.ok_or_else(|| {
-            Failure::Required(format!(
-                "setup: no 881 head or Ping answers at {at}; check its power, or name another kind of device as PLUGIN={at}"
-            ))
-        })?
+        let mut probed = Ok(Probed::default());
+        for _ in 0..ATTEMPTS {
+            probed = probe(at);
+            if probed.as_ref().is_ok_and(Probed::has_answers) {
+                break;
+            }
+        }
+        let probed = probed.map_err(|error| Failure::Required(format!("setup: {error}")))?;
+        probed.show_doubtful();
+        if probed.devices.is_empty() {
+            return Err(Failure::Required(format!(
+                "setup: no device at {at} is known as an 881 head or Ping; check its power, or name its kind as PLUGIN={at}"
+            )));
+        }
+        probed.devices
     };
-    for (key, value) in &port.keys {
-        device.keys.push_str(&tunnel_option::line(key, value));
-    }
-    Ok(device)
+    Ok(devices.into_iter().map(|device| device.with(&port.keys)).collect())
 }
 
-/// The device on a port, bus or interface of this computer. `None` if there is no device, or the user doesn't want it.
-fn attached(found: &Found, questions: &mut Questions) -> Result<Option<FoundDevice>, Failure> {
+/// Shows that a device isn't in the vehicle file, and the reason.
+fn left_out(connect: &Connect, why: &str) {
+    say(&one_line(&format!("left out {connect}: {why}")));
+}
+
+/// The wanted devices on a port, bus or interface of this computer.
+fn attached(found: &Found, questions: &mut Questions) -> Result<Vec<FoundDevice>, Failure> {
     let connect = found.connect.as_deref().map(|text| text.replace("ADDRESS", DEPTH_SENSOR));
-    let Some(connect) = connect.and_then(|text| Connect::parse(&text).ok()) else { return Ok(None) };
-    let left_out = |why: &str| say(&one_line(&format!("left out {connect}: {why}")));
+    let Some(connect) = connect.and_then(|text| Connect::parse(&text).ok()) else { return Ok(Vec::new()) };
+    let left_out = |why: &str| left_out(&connect, why);
     for trouble in &found.troubles {
-        left_out(&trouble.to_string());
+        // CAN interfaces and HID devices may be added in spite of the problem.
+        if matches!(found.carrier, Carrier::Can | Carrier::Hid) {
+            complain(&format!("headrace: warning: {connect}: {trouble}"));
+        } else {
+            left_out(&trouble.to_string());
+        }
     }
     let (plugin, kind, is_suggested) = match found.carrier {
         Carrier::Can => ("imu_can", "an inertial unit", true),
@@ -190,29 +228,27 @@ fn attached(found: &Found, questions: &mut Questions) -> Result<Option<FoundDevi
         }
         Carrier::I2c => {
             left_out("for a depth sensor, --port bar100=CONNECT");
-            return Ok(None);
+            return Ok(Vec::new());
         }
         Carrier::Serial | Carrier::Tcp | Carrier::Udp => {
             if !found.troubles.is_empty() {
-                return Ok(None);
+                return Ok(Vec::new());
             }
-            let device = probe(&connect);
-            match &device {
-                Ok(None) => {
-                    left_out("no 881 head or Ping answers; for another device, --port PLUGIN=CONNECT");
-                }
+            let probed = probe(&connect);
+            match &probed {
+                Ok(probed) if probed.has_answers() => probed.show_doubtful(),
+                Ok(_) => left_out("no 881 head or Ping answers; for another device, --port PLUGIN=CONNECT"),
                 Err(error) => left_out(&error.to_string()),
-                Ok(Some(_)) => {}
             }
-            return Ok(device.ok().flatten());
+            return Ok(probed.map(|probed| probed.devices).unwrap_or_default());
         }
     };
     let says = found.says.as_deref().unwrap_or("unnamed");
     if questions.confirm(&format!("Is {kind} at {connect} ({says})?"), is_suggested)? {
-        return Ok(Some(FoundDevice::new(plugin, connect, String::new())));
+        return Ok(vec![FoundDevice::new(plugin, connect, String::new())]);
     }
     left_out(&format!("if it is {kind}, --port {plugin}=CONNECT"));
-    Ok(None)
+    Ok(Vec::new())
 }
 
 /// Whether a HID device has the ids of the reference counter. Source: plugins/tether_hid.
@@ -220,15 +256,50 @@ fn is_reference(id: &UsbIdentity) -> bool {
     (id.vendor, id.product) == (0x1209, 0x0001)
 }
 
-/// Probes a port. `None` if no device answers.
-fn probe(connect: &Connect) -> Result<Option<FoundDevice>, OpenError> {
-    for kind in KINDS {
-        let Some(probe) = kind.probe() else { continue };
-        if let Answer::Is(identity) = headrace_ports::probe(connect, &mut [probe])? {
-            return Ok(Some(FoundDevice::new(kind.name(), connect.clone(), identity)));
+/// Devices that answer probes of a port.
+#[derive(Debug, Default)]
+struct Probed {
+    devices: Vec<FoundDevice>,
+    /// Devices that may be of another kind than the probe's.
+    doubtful: Vec<FoundDevice>,
+}
+
+impl Probed {
+    fn has_answers(&self) -> bool {
+        !self.devices.is_empty() || !self.doubtful.is_empty()
+    }
+
+    /// Shows the doubtful devices, and how to add them.
+    fn show_doubtful(&self) {
+        for FoundDevice { plugin, connect, identity, keys, .. } in &self.doubtful {
+            let keys = keys.lines().fold(String::new(), |keys, line| keys + "," + &line.replace(" = ", "="));
+            left_out(
+                connect,
+                &format!(
+                    "{identity}; if it is of the kind {plugin}, name each device of this port, this one with --port \
+                     {plugin}={connect}{keys}"
+                ),
+            );
         }
     }
-    Ok(None)
+}
+
+/// Probes a port for all devices of one kind.
+fn probe(connect: &Connect) -> Result<Probed, OpenError> {
+    let mut probed = Probed::default();
+    for kind in KINDS {
+        for mut probe in kind.probes().into_iter().map(|probe| [probe]) {
+            let Answer::Is(identity) = headrace_ports::probe(connect, &mut probe)? else { continue };
+            let device = FoundDevice::new(kind.name(), connect.clone(), identity);
+            let [probe] = probe;
+            let list = if probe.is_of_kind() { &mut probed.devices } else { &mut probed.doubtful };
+            list.push(device);
+        }
+        if probed.has_answers() {
+            break;
+        }
+    }
+    Ok(probed)
 }
 
 /// Asks for a key that the device's kind requires.

@@ -12,18 +12,20 @@ use crate::check;
 use crate::cli::{self, Setup};
 use crate::failure::Failure;
 use crate::files;
+use crate::logging::complain;
 use crate::output::{say, show};
 use crate::outputs::{Claims, Kind};
 use crate::tunnel_option;
 use crate::vehicle_file;
 use devices::FoundDevice;
 use questions::{Question, Questions};
-use vehicle_text::{Answers, is_head};
+use vehicle_text::{Answers, has_direction, is_head};
 
 /// Mode that every head gets until the best mode is known.
 const ANY_MODE: &str = "slow";
-/// Name of the file of udev rules, as in the package.
-const RULES_FILE: &str = "70-headrace.rules";
+/// Name of the file of additional udev rules. It differs from the package's name, because udev ignores a file of the
+/// package if a file with the same name is in /etc.
+const RULES_FILE: &str = "71-headrace-local.rules";
 
 /// Runs `headrace setup`. Returns the exit code of the file's check.
 pub(crate) fn setup(args: &Setup) -> Result<u8, Failure> {
@@ -39,10 +41,14 @@ pub(crate) fn setup(args: &Setup) -> Result<u8, Failure> {
     questions.complete()?;
     let Some(answers) = answers else { return Err(Failure::Usage("setup: an answer is missing".to_owned())) };
     let written = |mode: &str, planned_mps| vehicle_text::text(&answers, &devices, mode, planned_mps);
-    let mut text = written(ANY_MODE, None);
-    let vehicle = vehicle_file::parse(&args.out.display().to_string(), &text, &load);
-    if let Some((mode, planned_mps)) = vehicle.ok().and_then(|vehicle| check::best_mode(vehicle, &text)) {
+    // If the user has given the mode of a head, the other heads get the same mode.
+    let given = devices.iter().filter(|device| is_head(device)).find_map(|head| head.value("mode"));
+    let mut text = written(given.unwrap_or(ANY_MODE), None);
+    let parse = |text: &str| vehicle_file::parse(&args.out.display().to_string(), text, &load);
+    let mode = if given.is_some() { check::planned_mode } else { check::best_mode };
+    if let Some((mode, planned_mps)) = mode(parse(&text)?, &text) {
         text = written(mode, Some(planned_mps));
+        parse(&text)?;
     }
     files::write(&args.out, text.as_bytes())?;
     say(&format!("vehicle {}", args.out.display()));
@@ -72,8 +78,9 @@ fn answers(
     let tunnel = given.map_or_else(|| questions.ask(&question, tunnel_of), |tunnel| Ok(Some(tunnel)))?;
     let question =
         Question { text: "Length of the tunnel, metres", option: "--length METRES", suggestion: None };
-    let length_m =
-        args.length.map_or_else(|| questions.ask(&question, cli::length), |given| Ok(Some(given)))?;
+    let in_tunnel = tunnel.as_ref().and_then(|(text, _)| tunnel_option::length(text));
+    let given = args.length.or(in_tunnel.and_then(|text| text.parse().ok()));
+    let length_m = given.map_or_else(|| questions.ask(&question, cli::length), |given| Ok(Some(given)))?;
     let question = Question {
         text: "Target: smallest feature that must be found, metres",
         option: "--target METRES",
@@ -97,18 +104,31 @@ fn answers(
     Ok(all.map(|((tunnel, length_m), target_m)| Answers { tunnel, length_m, target_m, mounts }))
 }
 
-/// Mount of a device. Only that of a sonar is asked for, because for other devices the origin is usually good enough.
+/// Mount of a device. That of a sonar is required. The direction of an inertial unit or DVL matters, too, and is asked for
+/// on a terminal. For other devices the origin is usually good enough.
 fn mount(
     args: &Setup,
     device: &FoundDevice,
     questions: &mut Questions,
 ) -> Result<Option<[[f64; 3]; 2]>, Failure> {
     let given = args.mount.iter().find(|(id, _)| *id == device.id).map(|(_, mount)| *mount);
-    if given.is_some() || !(is_head(device) || device.plugin == "ping1d") {
+    let is_sonar = is_head(device) || device.plugin == "ping1d";
+    let is_asked = questions.has_terminal() && !args.yes;
+    if given.is_some() || !(is_sonar || has_direction(device)) {
         return Ok(given);
     }
+    if !is_sonar && !is_asked {
+        complain(&format!(
+            "headrace: warning: {id} ({}): its direction isn't given, so the file has zero angles; give it with --mount \
+             {id}=ROLL,PITCH,YAW",
+            device.connect,
+            id = device.id
+        ));
+        return Ok(None);
+    }
     let text = format!(
-        "Mount of {} ({}): metres forward, left and up, and ahead, aft, left, right, up or down; such as 0.3,0,-0.1,ahead",
+        "Mount of {} ({}): metres forward, left and up, and ahead, aft, left, right, up or down; such as 0.3,0,-0.1,ahead; \
+         or roll, pitch and yaw, degrees",
         device.id, device.connect
     );
     let option = format!("--mount {}=X,Y,Z,DIRECTION", device.id);
@@ -120,7 +140,7 @@ fn show_missing_rules(devices: &[FoundDevice]) {
     let missing = rules::missing(devices.iter().map(|device| &device.connect), Path::new("/"));
     if !missing.is_empty() {
         show(&format!(
-            "this computer lacks udev rules for these devices; install them as root:\ncat > /etc/udev/rules.d/{RULES_FILE} \
+            "this computer lacks udev rules for these devices; install them as root:\ncat >> /etc/udev/rules.d/{RULES_FILE} \
              <<'END'\n{}\nEND\nudevadm control --reload && udevadm trigger\n",
             missing.join("\n")
         ));

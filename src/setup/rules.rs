@@ -1,5 +1,6 @@
 //! udev rules that the devices need and this computer lacks.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
@@ -7,7 +8,8 @@ use headrace_sensor::connect::{Connect, SerialPort, UsbIdentity};
 
 /// The rules of the package.
 const RULES: &str = include_str!("../../deploy/udev/70-headrace.rules");
-/// Folders in which udev looks for rules. Source: `udev(7)`.
+/// Folders in which udev looks for rules. A file is ignored if an earlier folder has one with its name. Source:
+/// `udev(7)`.
 const FOLDERS: [&str; 4] =
     ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"];
 /// USB vendor id of FTDI, which makes serial adapters.
@@ -45,12 +47,15 @@ fn marks(connect: &Connect) -> Option<(String, &'static str)> {
     }
 }
 
-/// All installed rules, without comments.
+/// All rules that udev uses, without comments.
 fn installed(root: &Path) -> String {
     let folders = FOLDERS.iter().filter_map(|folder| fs::read_dir(root.join(folder)).ok());
-    let files = folders.flatten().flatten().filter_map(|file| fs::read_to_string(file.path()).ok());
+    let mut files = BTreeMap::new();
+    for file in folders.flatten().flatten() {
+        files.entry(file.file_name()).or_insert_with(|| file.path());
+    }
     let mut text = String::new();
-    for file in files {
+    for file in files.values().filter_map(|path| fs::read_to_string(path).ok()) {
         for line in file.lines().filter(|line| !line.trim_start().starts_with('#')) {
             text.push_str(line);
             text.push('\n');
@@ -92,7 +97,14 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("70-headrace.rules"), RULES).unwrap();
         let lacking = missing(connections.iter(), &root);
-        fs::remove_dir_all(&root).unwrap();
         assert_eq!(lacking.len(), 1, "the package's rules have another counter: {lacking:#?}");
+        let own = root.join("etc/udev/rules.d");
+        fs::create_dir_all(&own).unwrap();
+        fs::write(own.join("71-headrace-local.rules"), &lacking[0]).unwrap();
+        assert_eq!(missing(connections.iter(), &root), [""; 0]);
+        fs::write(own.join("70-headrace.rules"), "").unwrap();
+        let lacking = missing(connections.iter(), &root);
+        fs::remove_dir_all(&root).unwrap();
+        assert_eq!(lacking.len(), begins.len() - 1, "the package's file is masked: {lacking:#?}");
     }
 }

@@ -47,7 +47,8 @@ pub(super) fn text(
     line("name = \"vehicle\"", "shown on screens and in reports");
     line(&format!("target_m = {}", answers.target_m), "largest hole that passes, m");
     line("\n[tunnel]", "");
-    tunnel_option::table(&answers.tunnel.0).lines().for_each(|key| line(key, ""));
+    let keys = tunnel_option::table(&answers.tunnel.0);
+    keys.lines().filter(|key| !key.starts_with(tunnel_option::LENGTH)).for_each(|key| line(key, ""));
     line(&format!("length_m = {}", answers.length_m), "from the portal");
     line("\n[water]", "");
     line(&format!("sound_speed_mps = {}", site.sound_speed_mps), "fresh water at 10 degrees");
@@ -70,12 +71,14 @@ pub(super) fn text(
         line(&format!("connect = {:?}", device.connect.to_string()), "");
         let [position, angles] = mount.unwrap_or_default();
         line(&format!("position_m = {position:?}"), "forward, left, up from the vehicle's origin");
-        line(&format!("angles_deg = {angles:?}"), "roll, pitch, yaw");
+        let lacks_angles = mount.is_none() && has_direction(device);
+        let note = if lacks_angles { ": NOT GIVEN, write its direction" } else { "" };
+        line(&format!("angles_deg = {angles:?}"), &format!("roll, pitch, yaw{note}"));
         device.keys.lines().for_each(|key| line(key, ""));
         if is_head(device) {
             let [mode_key, range_key] = head_keys(device, &answers.tunnel.1, mode);
             if let Some(key) = mode_key {
-                line(&key, "the mode with the largest speed for the target");
+                line(&key, mode_comment(devices));
             }
             let farthest_m = farthest_m(&answers.tunnel.1);
             let comment = format!("the wall is up to {farthest_m:.1} m from the middle of the tunnel");
@@ -90,6 +93,17 @@ pub(super) fn text(
 /// Whether a device is a profiling head.
 pub(super) fn is_head(device: &FoundDevice) -> bool {
     device.plugin == "imagenex881"
+}
+
+/// Whether readings of a device are useless if its direction is wrong, although it is no sonar.
+pub(super) fn has_direction(device: &FoundDevice) -> bool {
+    ["imu_can", "a50"].contains(&device.plugin)
+}
+
+/// Reason for the mode of a head that has no given mode.
+fn mode_comment(devices: &[FoundDevice]) -> &'static str {
+    let is_given = devices.iter().any(|device| is_head(device) && device.has("mode"));
+    if is_given { "the same as other heads" } else { "the mode with the largest speed for the target" }
 }
 
 /// Keys of a head for mode and range setting, unless the user has given them.

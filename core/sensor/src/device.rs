@@ -120,9 +120,11 @@ pub trait DeviceKind: Sync {
     /// Errors: the value of a key is not allowed.
     fn configure(&self, sensor: &SensorConfig, own: &Section<'_>) -> Result<Box<dyn Device>, ConfigError>;
 
-    /// Returns a probe that finds devices of this kind on a byte stream; `None` if they cannot be queried.
-    fn probe(&self) -> Option<Box<dyn Probe>> {
-        None
+    /// Returns probes that find devices of this kind on a byte stream; empty if they cannot be queried.
+    ///
+    /// If several devices can share a line, each has its own probe.
+    fn probes(&self) -> Vec<Box<dyn Probe>> {
+        Vec::new()
     }
 }
 

@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::codec::{Header, Model, Return, ReturnCodec, Returns, SOUND_SPEED_MPS, Tag};
 use crate::driver::{CARRIERS, HeadDriver};
 use crate::emulator::HeadEmulator;
-use crate::probe::HeadProbe;
+use crate::probe::{HEAD_IDS, HeadProbe};
 use crate::settings::{Settings, range_setting};
 
 /// Name of this device kind in vehicle files and logs.
@@ -43,8 +43,8 @@ impl DeviceKind for Imagenex881Kind {
         Ok(Box::new(Imagenex881 { sensor: sensor.clone(), settings }))
     }
 
-    fn probe(&self) -> Option<Box<dyn Probe>> {
-        Some(Box::new(HeadProbe::default()))
+    fn probes(&self) -> Vec<Box<dyn Probe>> {
+        HEAD_IDS.iter().map(|id| Box::new(HeadProbe::new(*id)) as Box<dyn Probe>).collect()
     }
 }
 

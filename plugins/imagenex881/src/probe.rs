@@ -6,16 +6,24 @@ use headrace_sensor::driver::Probe;
 use crate::codec::{Command, Header, Model, Points, ReturnCodec, ZERO_COUNT};
 
 /// Probed head ids: the default, and the usual ids of further heads on an RS-485 line.
-const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
+pub(crate) const HEAD_IDS: [u8; 4] = [0x10, 0x11, 0x12, 0x13];
 
 /// Degrees per count of a head's position.
 const DEGREES_A_COUNT: f64 = 0.3;
 
-/// Polls the probed head ids, and accepts the first whole return as the answer.
-#[derive(Debug, Clone, Default)]
+/// Polls a head id, and accepts the first whole return with this id as the answer.
+#[derive(Debug, Clone)]
 pub struct HeadProbe {
+    head_id: u8,
     codec: ReturnCodec,
     found: Option<Header>,
+}
+
+impl HeadProbe {
+    /// Creates a probe for the head with this id.
+    pub fn new(head_id: u8) -> Self {
+        Self { head_id, codec: ReturnCodec::default(), found: None }
+    }
 }
 
 /// Command for a ping at minimum range and gain, without a step.
@@ -43,13 +51,14 @@ fn standing_still(head_id: u8) -> Command {
 
 impl Probe for HeadProbe {
     fn questions(&self) -> Vec<Vec<u8>> {
-        let commands = HEAD_IDS.iter().filter_map(|id| standing_still(*id).encode().ok());
-        commands.map(|bytes| bytes.to_vec()).collect()
+        standing_still(self.head_id).encode().iter().map(|bytes| bytes.to_vec()).collect()
     }
 
     fn heard(&mut self, bytes: &[u8]) {
-        let found = &mut self.found;
-        self.codec.push(bytes, &mut |answer| *found = found.or(Some(answer.header)));
+        let Self { head_id, codec, found } = self;
+        codec.push(bytes, &mut |answer| {
+            *found = found.or(Some(answer.header).filter(|header| header.head_id == *head_id));
+        });
     }
 
     fn identity(&self) -> Option<String> {
@@ -62,6 +71,10 @@ impl Probe for HeadProbe {
         let degrees = f64::from(i32::from(position) - ZERO_COUNT) * DEGREES_A_COUNT;
         let refuses = if status.accepted() { "" } else { ", refuses the settings" };
         Some(format!("Imagenex {model}, head_id = {head_id:#04x}, at {degrees:.1} degrees{refuses}"))
+    }
+
+    fn is_of_kind(&self) -> bool {
+        self.found.is_some_and(|header| Model::of_head_id(header.head_id) == Model::Head881)
     }
 }
 
@@ -77,12 +90,16 @@ mod tests {
     use crate::settings::tests::settings;
     use crate::stepping::Head;
 
+    fn questions() -> Vec<Vec<u8>> {
+        HEAD_IDS.iter().flat_map(|id| HeadProbe::new(*id).questions()).collect()
+    }
+
     /// Returns the answers of a head configured with these keys to all probe requests, in order.
     fn answers(keys: &str) -> Vec<Vec<u8>> {
         let setup = EmulatorSetup { start: MonoNs(0), head: None, site: Site::default(), polled: false };
         let mut head = HeadEmulator::new(settings(keys).unwrap(), DurNs(0), &setup);
         let (mut due, mut answers) = (Vec::new(), Vec::new());
-        for (number, question) in HeadProbe::default().questions().iter().enumerate() {
+        for (number, question) in questions().iter().enumerate() {
             let at = MonoNs(1_000_000_000 * (number as u64 + 1));
             head.hear(at, question, &mut |_, _, _| ());
             head.begin(at + DurNs(1), &mut due);
@@ -98,7 +115,7 @@ mod tests {
 
     #[test]
     fn probe_reports_head_id_and_position() {
-        let mut probe = HeadProbe::default();
+        let mut probe = HeadProbe::new(0x10);
         assert_eq!(probe.identity(), None);
         let answers = answers("mode = \"slow\"");
         assert_eq!(answers.len(), 1, "the head answers only the question with its id");
@@ -108,15 +125,19 @@ mod tests {
         assert_eq!(probe.identity(), None, "half a return identifies no head");
         probe.heard(second);
         assert_eq!(probe.identity().unwrap(), "Imagenex 881 family, head_id = 0x10, at 0.0 degrees");
+        assert!(probe.is_of_kind());
     }
 
     #[test]
-    fn probe_finds_a_head_with_id_0x13() {
-        let mut probe = HeadProbe::default();
+    fn only_the_probe_of_its_id_finds_a_head() {
+        let [mut probe, mut other] = [0x13, 0x12].map(HeadProbe::new);
         for answer in answers("mode = \"slow\"\nhead_id = 0x13") {
             probe.heard(&answer);
+            other.heard(&answer);
         }
         assert!(probe.identity().unwrap().contains("head_id = 0x13"));
+        assert!(!probe.is_of_kind(), "it may be an 852 sounder");
+        assert_eq!(other.identity(), None);
     }
 
     #[test]
@@ -124,7 +145,7 @@ mod tests {
         let mut head = Head::new(700, true);
         let mut asked = 0;
         let mut codec = CommandCodec::default();
-        for question in HeadProbe::default().questions() {
+        for question in questions() {
             codec.push(&question, &mut |command| {
                 head.obey(&command);
                 asked += 1;

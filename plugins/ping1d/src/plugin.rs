@@ -43,8 +43,8 @@ impl DeviceKind for Ping1dKind {
         Ok(Box::new(Ping1d { sensor: sensor.clone(), settings }))
     }
 
-    fn probe(&self) -> Option<Box<dyn Probe>> {
-        Some(Box::new(PingProbe::default()))
+    fn probes(&self) -> Vec<Box<dyn Probe>> {
+        vec![Box::new(PingProbe::default())]
     }
 }
 

@@ -7,6 +7,8 @@ use crate::codec::{Addressed, DeviceInformation, Message, PingCodec, ProtocolVer
 
 /// Broadcast device id. Source: Ping protocol, device ids.
 const EVERYONE: u8 = 255;
+/// Device type of Ping1D and Ping2. Source: Ping protocol, `device_information`.
+const ECHOSOUNDER: u8 = 1;
 
 /// Requests the identity by broadcast and accepts the first answer.
 #[derive(Debug, Clone, Default)]
@@ -41,7 +43,7 @@ impl Probe for PingProbe {
             device_type, revision, firmware_major, firmware_minor, firmware_patch, ..
         } = device;
         let kind = match device_type {
-            1 => "Ping echosounder (Ping1D, Ping2)".to_owned(),
+            ECHOSOUNDER => "Ping echosounder (Ping1D, Ping2)".to_owned(),
             2 => "Ping360, not an echosounder".to_owned(),
             other => format!("Ping device of type {other}, not an echosounder"),
         };
@@ -52,6 +54,10 @@ impl Probe for PingProbe {
             "{kind}, device_id = {device_id}, revision {revision}, firmware {firmware_major}.{firmware_minor}.{firmware_patch}{}",
             version.unwrap_or_default()
         ))
+    }
+
+    fn is_of_kind(&self) -> bool {
+        self.found.is_some_and(|(_, device)| device.device_type == ECHOSOUNDER)
     }
 }
 
@@ -82,6 +88,7 @@ mod tests {
             probe.identity().unwrap(),
             "Ping echosounder (Ping1D, Ping2), device_id = 7, revision 1, firmware 3.29.0, protocol 1.0.0"
         );
+        assert!(probe.is_of_kind());
     }
 
     #[test]
@@ -99,5 +106,6 @@ mod tests {
         let mut probe = PingProbe::default();
         probe.heard(answer.as_slice());
         assert!(probe.identity().unwrap().starts_with("Ping360, not an echosounder, device_id = 2"));
+        assert!(!probe.is_of_kind());
     }
 }

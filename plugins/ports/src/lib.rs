@@ -27,7 +27,7 @@ pub use discover::can::is_interface_up;
 pub use discover::{Found, Machine, Presence, Rights, User, discover, presence};
 pub use host::Host;
 pub use line_service::{Attached, Common, LineRecord, LineService};
-pub use lines::{IsValid, Line, READ_BYTES, Senders};
+pub use lines::{IsValid, Line, READ_BYTES, Senders, same_device};
 pub use open_error::{OpenError, OpenErrorKind};
 #[cfg(target_os = "linux")]
 pub use probe::{Answer, probe};

@@ -98,7 +98,7 @@ impl Drop for Device {
 }
 
 fn probes() -> Vec<Box<dyn Probe>> {
-    KINDS.iter().filter_map(|kind| kind.probe()).collect()
+    KINDS.iter().flat_map(|kind| kind.probes()).collect()
 }
 
 fn asked(device: &Device) -> Answer {

@@ -118,4 +118,7 @@ pub trait Probe: Send {
     ///
     /// A part `key = value` is a line for the device's table in a vehicle file.
     fn identity(&self) -> Option<String>;
+
+    /// Whether the device is certainly of this kind. Devices of other kinds may answer, too.
+    fn is_of_kind(&self) -> bool;
 }

@@ -152,7 +152,9 @@ async fn login(State(shared): Here, caller: Extension<Caller>, headers: HeaderMa
         return denied.into_response();
     }
     let secure = if shared.is_tls { "; Secure" } else { "" };
-    let cookie = format!("{COOKIE}={token}; Path=/; Max-Age={COOKIE_S}; HttpOnly; SameSite=Strict{secure}");
+    // Without a path, the cookie belongs to the folder of /login as the browser sees it. Behind a proxy that serves several
+    // programs below paths, the others don't get the token.
+    let cookie = format!("{COOKIE}={token}; Max-Age={COOKIE_S}; HttpOnly; SameSite=Strict{secure}");
     (StatusCode::SEE_OTHER, home, [(header::SET_COOKIE, cookie)]).into_response()
 }
 

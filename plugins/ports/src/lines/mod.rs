@@ -18,7 +18,7 @@ use headrace_sensor::connect::Connect;
 
 use crate::open_error::OpenError;
 pub use line::{IsValid, Line, READ_BYTES, Senders};
-pub(crate) use same_device::same_device;
+pub use same_device::same_device;
 
 /// Opens the port or connection that a `connect` names.
 ///

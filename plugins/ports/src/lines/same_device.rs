@@ -23,7 +23,7 @@ enum End {
 /// host name.
 ///
 /// Returns `false` if either device is absent, because the answer isn't known then.
-pub(crate) fn same_device(one: &Connect, other: &Connect) -> bool {
+pub fn same_device(one: &Connect, other: &Connect) -> bool {
     // The carriers are compared first, because name lookups take time.
     one.carrier() == other.carrier() && end(one).is_some_and(|end| Some(end) == self::end(other))
 }
