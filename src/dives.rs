@@ -155,7 +155,7 @@ impl Dive {
         row.map(|cell| one_line(&cell).into_owned())
     }
 
-    /// What remains to be done for the dive.
+    /// Texts about an interrupted dive and a missing report, with the commands that help.
     fn advice(&self) -> Vec<String> {
         let name = self.recording.display();
         let mut advice = Vec::new();

@@ -12,7 +12,14 @@ fn dives_of_a_folder_have_the_figures_of_their_reports() {
     let folder = Folder::new();
     folder.write("murk.mcap", golden("murk"));
     folder.write("fast.mcap", golden("too-fast"));
-    folder.write("other.json", "{}");
+    for (name, broken) in [
+        ("a.json", &b"\xff{"[..]),
+        ("b.json", b"{"),
+        ("c.json", b"{\"log\": {\"path\": 1}}"),
+        ("d.json", b"[]"),
+    ] {
+        folder.write(name, broken);
+    }
     let murk: Value = folder.replay("murk.mcap", &[]).1;
     folder.write("of-murk.json", murk.to_string());
     let answer = folder.headrace(&["dives", "--json"]);
