@@ -92,10 +92,11 @@ fn deliver_to(
 
 /// Writes the report in its three forms. Returns the letters that the PDF can't show.
 fn write_report(folder: &Path, delivery: &Delivery<'_>) -> Result<String, Failure> {
-    let least_m = delivery.least_every_m();
+    // Rounded up, so that the stated distance is allowed.
+    let least_m = (delivery.least_every_m() * 1000.0).ceil() / 1000.0;
     if let Some(every_m) = delivery.every_m.filter(|every_m| *every_m < least_m) {
         return Err(Failure::Usage(format!(
-            "--every {every_m}: the dive would have over 2000 cross-sections; allowed is {least_m:.2} m or more"
+            "--every {every_m}: the dive would have over 2000 cross-sections; allowed is {least_m:.3} m or more"
         )));
     }
     let document = delivery.document();

@@ -87,7 +87,8 @@ impl<'a> Collector<'a> {
         let mut words = view.surveyor().digests().pings.words();
         while let Some((record, rest)) = first_record(words) {
             words = rest;
-            let [received, source, ..] = *record.words else { continue };
+            // Outcomes 1 and 2 are pings without a return, for which no point waits.
+            let [received, source, 0 | 3, ..] = *record.words else { continue };
             let Some(mut point) = self.next_waiting([received, source]) else { continue };
             point.is_doubtful = record.kind == Some(RecordKind::Doubtful);
             if point.is_doubtful || record.kind == Some(RecordKind::Sample) {

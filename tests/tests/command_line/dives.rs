@@ -40,9 +40,21 @@ fn dives_of_a_folder_have_the_figures_of_their_reports() {
         (dive["duration_s"].as_f64().unwrap() - murk["dive"]["duration_s"].as_f64().unwrap()).abs() < 1.0
     );
     assert_eq!(of("fast.mcap")["pass_m"], Value::Null, "it has no report");
+    // The report that is named like the recording has precedence over others of the same recording.
+    let (_, other) = folder.replay("murk.mcap", &["--target", "0.1"]);
+    assert_ne!(other["summary"], murk["summary"]);
+    folder.write("a-report.json", other.to_string());
+    folder.write("murk.json", murk.to_string());
+    let again: Value = serde_json::from_str(&folder.headrace(&["dives", "--json"]).stdout).unwrap();
+    let paths: Vec<&Value> = again["dives"].as_array().unwrap().iter().map(|dive| &dive["report"]).collect();
+    assert!(paths.contains(&&Value::from("./murk.json")), "{paths:?}");
     let text = folder.headrace(&["dives"]).stdout;
+    let pass_m = format!(" {:.2} ", sums["pass_m"].as_f64().unwrap());
+    let is_of_murk = |line: &str| line.starts_with("murk.mcap ") && line.contains(&pass_m);
+    assert!(text.lines().any(is_of_murk), "{text}");
     assert!(text.contains("fast.mcap: there is no report"), "{text}");
     assert!(!text.contains("murk.mcap: "), "{text}");
+    assert_eq!(text.lines().count(), 4, "titles, two dives, and the missing report: {text}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Early fail of a section, before its hole is final. It requires a large empty circle, all of which lies where no more
 //! samples can land.
 
-use super::finder::{HoleFinder, NO_OWNER, ROUNDING_M, Tile, cell_m, first_tiles};
+use super::finder::{HoleFinder, NO_OWNER, Tile, cell_m, first_tiles};
 use crate::frontier::{Reach, clear_of};
 use crate::store::SampleStore;
 
@@ -39,7 +39,8 @@ impl HoleFinder {
         debug_assert!(slope >= 0.0, "the largest change of a radius isn't negative: {slope}");
         let Self { window, tiles, .. } = self;
         let length_m = to_m - from_m;
-        let around_m = most_m + ROUNDING_M;
+        // The largest radius is that at places around the wall. Between them a radius may be slightly larger.
+        let around_m = needed.most_m + length_m;
         window.fill((store, 0), from_m, (-around_m, length_m + around_m), cell_m(needed.most_m));
         tiles.clear();
         let perimeter_m = store.perimeter_m();

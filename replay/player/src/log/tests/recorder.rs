@@ -114,12 +114,14 @@ fn unsynced_time_lasts_from_latest_sync_to_latest_tick() {
 /// limit, it waits while the medium makes progress.
 #[test]
 fn slow_recording_is_cut_off_at_the_time_limit_only_on_request() {
+    // The messages are made before the recorder begins to write, so that the queue is full in a few milliseconds.
+    let messages: Vec<Vec<u8>> = (0..20_000).map(|round| noise(round, 300)).collect();
     for in_time in [true, false] {
-        let (medium, _flushed) = slow(5);
+        let (medium, _flushed) = slow(10);
         let (mut port, mut handle) = Recorder::start(medium, &header(true), 16 << 20).unwrap();
-        for round in 0..20_000_u32 {
+        for (round, bytes) in (0_u32..).zip(&messages) {
             let now = MonoNs(round.into());
-            port.raw(1, now, now, &noise(round.into(), 300)).unwrap();
+            port.raw(1, now, now, bytes).unwrap();
             port.tick(round.into(), now, &[1]).unwrap();
         }
         handle.patience = Duration::from_millis(600);
