@@ -51,7 +51,7 @@ pub(crate) fn dives(args: &Dives) -> Result<u8, Failure> {
     let plain = |path: PathBuf| path.strip_prefix(".").map_or_else(|_| path.clone(), Path::to_owned);
     let mut logs: Vec<PathBuf> =
         files_of(std::slice::from_ref(&args.folder))?.into_iter().map(plain).collect();
-    let recordings: BTreeSet<PathBuf> = logs.iter().map(recording_of).collect();
+    let recordings: BTreeSet<PathBuf> = logs.iter().map(|log| recording_of(log)).collect();
     let reports = reports_in(&args.folder)?;
     let (mut dives, mut unreadable) = (Vec::new(), Vec::new());
     for recording in recordings {
@@ -120,8 +120,8 @@ fn report_of(recording: &Path, reports: &[(PathBuf, Value)]) -> Option<(PathBuf,
 }
 
 /// Name of the recording to which a log belongs by its own name.
-fn recording_of(log: &PathBuf) -> PathBuf {
-    named_part(log).map_or_else(|| log.clone(), |(recording, _)| recording)
+fn recording_of(log: &Path) -> PathBuf {
+    named_part(log).map_or_else(|| log.to_owned(), |(recording, _)| recording)
 }
 
 fn text_of(path: &Path) -> String {
