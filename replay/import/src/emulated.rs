@@ -84,9 +84,9 @@ pub(super) enum Unsent {
 pub(super) const TOO_UNCERTAIN: &str =
     "readings whose variance exceeds the noise in [navigation] of the vehicle file, withheld";
 
-/// Largest stated sd of a turn rate or specific force, as a multiple of the noise that the filter assumes for a sample.
+/// Largest stated sd of a turn rate or force, as a multiple of the noise that the filter assumes.
 ///
-/// Stated sds contain more than white noise, such as the bias. The factor of 10 allows for this. It is a choice, not a
+/// The noise is that of a sample of [`PERIOD`]. Stated sds contain more than white noise, such as the bias. The factor of 10 allows for this. It is a choice, not a
 /// measurement.
 const INERTIAL_SD_FACTOR: f64 = 10.0;
 
@@ -183,7 +183,7 @@ impl EmulatedSensor {
     ) -> [bool; 3] {
         let [tilt_alone, most_heading, most_rate, most_force] = self.inertial_variances;
         let (is_rate_certain, is_force_certain) = (rate <= most_rate, force <= most_force);
-        // The filter assumes less noise of the tilt if turn rate or specific force are missing.
+        // The filter assumes less noise of the tilt if turn rate or specific force is missing.
         let is_complete = has_rate && is_rate_certain && has_force && is_force_certain;
         let most_tilt = if is_complete { self.usual_variance } else { tilt_alone };
         [tilt <= most_tilt && heading <= most_heading, is_rate_certain, is_force_certain]

@@ -148,6 +148,55 @@ fn doubt_without_a_field_in_the_message_is_withheld_with_its_reason() {
 }
 
 #[test]
+fn head_without_an_echo_needs_no_confidence() {
+    let head = [
+        column("head", "angle", "unit = \"deg\""),
+        column("head", "range", "unit = \"m\""),
+        column("head", "confidence", "unit = \"ratio\""),
+        column("head", "sd", "unit = \"m\""),
+        column("head", "valid", ""),
+    ];
+    let rows = "t,angle,range,confidence,sd,valid\n1,0,,0,9,1\n2,2.4,,,,1\n3,4.8,3,,0,1\n4,7.2,,0,0,0\n";
+    let (entries, lost) = read(&head, rows);
+    assert_eq!((entries.len(), lost.len()), (2, 2), "{lost:?}");
+    assert!(lost[0].starts_with("rows whose confidence") && lost[1].contains("invalid"), "{lost:?}");
+}
+
+#[test]
+fn words_for_flags_are_not_numbers() {
+    let columns = [
+        column("ping", "range", "unit = \"m\""),
+        column("ping", "confidence", "unit = \"ratio\""),
+        column("ping", "sd", "unit = \"m\""),
+        column("ping", "valid", ""),
+        column("ping", "status", ""),
+    ];
+    let rows = "t,range,confidence,sd,valid,status\n1,3,1,0,true,false\n2,3,true,0,1,0\n3,3,1,false,1,0\n";
+    let (entries, lost) = read(&columns, rows);
+    assert_eq!((entries.len(), lost.len()), (1, 2), "{lost:?}");
+    assert!(lost.iter().all(|why| why.starts_with("rows whose confidence")), "{lost:?}");
+}
+
+#[test]
+fn each_lost_reading_of_a_row_is_counted() {
+    let columns = [
+        column("depth", "pressure", "unit = \"Pa\""),
+        column("depth", "valid", ""),
+        column("ping", "range", "unit = \"m\""),
+        column("ping", "status", ""),
+    ];
+    let rows = "t,pressure,valid,range,status\n1,150000,0,3,1\n2,150000,1,3,1\n3,150000,0,3,1\n";
+    let mut csv = table(&columns, rows).unwrap();
+    let (entries, lost, _) = cut(&mut csv, rows.as_bytes());
+    let reasons: Vec<&str> = lost.iter().map(|(_, why)| why.split(',').next().unwrap()).collect();
+    let [invalid, status] = ["readings marked as invalid", "readings with a status other than 0"];
+    assert_eq!((entries.len(), &reasons[..]), (1, &[invalid, status, invalid][..]));
+    let losses = crate::Format::report(&csv).losses;
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert!(losses[0].starts_with(status) && losses[0].contains(": 2 more, in rows"), "{losses:?}");
+}
+
+#[test]
 fn table_with_the_points_of_echoes_is_refused() {
     let head = [column("head", "angle", "unit = \"deg\""), column("head", "range", "unit = \"m\"")];
     let points = (0..396).map(|bin| format!("1.0,12.5,{}.{:02}\n", bin / 40, bin % 40));
@@ -157,6 +206,9 @@ fn table_with_the_points_of_echoes_is_refused() {
         error.contains("three ranges of sensor \"head\" at one time and angle: the points of an echo"),
         "{error}"
     );
+    // Rows for other sensors, and points without a range, lie between the points.
+    let sparse = "t,angle,range\n1,12.5,3.1\n1,,\n1,12.5,\n1,12.5,3.2\n1.1,,\n1,12.5,3.3\n";
+    assert!(table(&head, sparse).is_err());
     // A head that turns by a step for each ping, in a table with coarse times.
     assert!(table(&head, "t,angle,range\n1,0,3.1\n1,2.4,3.2\n1,4.8,3.3\n").is_ok());
 }
@@ -309,6 +361,7 @@ fn depths_and_gauge_pressures_become_absolute_pressures() {
     for (quantity, keys, cell, expected_pa) in [
         ("depth", "unit = \"m\"\noffset = 0.5", "12", site.pressure_pa(12.5)),
         ("depth", "unit = \"cm\"\nfactor = -1", "-250", site.pressure_pa(2.5)),
+        ("depth", "unit = \"m\"\nfactor = -1\noffset = 0.5", "-12", site.pressure_pa(12.5)),
         ("gauge_pressure", "unit = \"kPa\"", "120", site.surface_pressure_pa + 120_000.0),
         ("pressure", "unit = \"mbar\"\noffset = -3", "1503", 150_000.0),
     ] {
