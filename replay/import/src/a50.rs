@@ -1,6 +1,6 @@
 //! Files with the lines of JSON that a velocity log A50 or A125 sends.
 //!
-//! The time of a report is the device's time of transmission.
+//! The time of a report is the device's time of transmission. It is UTC if the device's clock is set.
 
 use headrace_a50::report::{Lines, MAX_LINE_BYTES};
 use headrace_sensor::codec::Framing as _;
@@ -12,6 +12,8 @@ use crate::format::Format;
 /// The format of an A50's lines. Its only stream is [`STREAM`].
 #[derive(Debug, Clone, Copy, Default)]
 pub struct A50Format {
+    /// Time of the first velocity report; `None` before it.
+    first_ns: Option<u64>,
     /// Time of the latest velocity report; `None` before the first.
     last_ns: Option<u64>,
 }
@@ -23,16 +25,29 @@ const NO_REPORT: &str = "lines that aren't reports of an A50: damaged, or withou
 
 impl Format for A50Format {
     fn clock(&self) -> Clock {
-        Clock::Utc
+        Clock::of_first(self.first_ns)
     }
 
-    fn step(&mut self, front: &[u8], _: bool, out: &mut Vec<Entry>) -> Step {
-        let Some(newline) = front.iter().take(MAX_LINE_BYTES).position(|byte| *byte == b'\n') else {
-            let is_too_long = front.len() >= MAX_LINE_BYTES;
-            return if is_too_long { Step::Lost(MAX_LINE_BYTES, NO_REPORT) } else { Step::More };
-        };
-        let used = newline + 1;
-        let line = front.get(..used).unwrap_or_default().trim_ascii_start();
+    fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step {
+        if let Some(newline) = front.iter().take(MAX_LINE_BYTES).position(|byte| *byte == b'\n') {
+            let used = newline + 1;
+            return self.line(front.get(..used).unwrap_or_default().trim_ascii_start(), used, out);
+        }
+        if front.len() >= MAX_LINE_BYTES {
+            return Step::Lost(MAX_LINE_BYTES, NO_REPORT);
+        }
+        // A last line that ends with its closing brace is complete, even without a newline.
+        let line = [front.trim_ascii(), b"\n"].concat();
+        if end && line.ends_with(b"}\n") && matches!(Lines.judge(&line), Verdict::Frame(_)) {
+            return self.line(&line, front.len(), out);
+        }
+        Step::More
+    }
+}
+
+impl A50Format {
+    /// Reads a line that is `used` bytes long in the file.
+    fn line(&mut self, line: &[u8], used: usize, out: &mut Vec<Entry>) -> Step {
         if line.is_empty() {
             return Step::Took(used);
         }
@@ -55,6 +70,7 @@ impl Format for A50Format {
         let Some(stamp_ns) = stamp_ns.filter(|ns| *ns < 1 << 62) else {
             return Step::Lost(used, "velocity reports whose time is before 1970 or after 2116");
         };
+        self.first_ns = self.first_ns.or(Some(stamp_ns));
         self.last_ns = Some(stamp_ns);
         out.push(Entry { stamp_ns, stream: STREAM.to_owned(), bytes: line.to_vec() });
         Step::Took(used)
@@ -84,6 +100,31 @@ mod tests {
         assert_eq!((entries.len(), lost.len(), left), (2, 0, 20));
         assert_eq!((entries[0].stamp_ns, &entries[0].bytes), (1_700_000_000_100_000_000, &one));
         assert!(entries[1].stream.is_empty());
+    }
+
+    #[test]
+    fn complete_last_line_needs_no_newline() {
+        let one = report(Some([1_700_000_000_000_000, 1_700_000_000_100_000]));
+        let without = one.trim_ascii_end();
+        for further in [&b""[..], b"\r"] {
+            let (entries, lost, left) =
+                cut(&mut A50Format::default(), &[&one[..], without, further].concat());
+            assert_eq!((entries.len(), lost.len(), left), (2, 0, 0));
+            assert_eq!(entries[1].bytes, [without, b"\n"].concat());
+        }
+        let cut_short = &without[..without.len() - 1];
+        let (entries, lost, left) = cut(&mut A50Format::default(), &[&one[..], cut_short].concat());
+        assert_eq!((entries.len(), lost.len(), left), (1, 0, cut_short.len()));
+    }
+
+    #[test]
+    fn unset_device_clock_is_not_utc() {
+        for (transmission_us, expected) in [(5_000_000, Clock::Own), (1_700_000_000_100_000, Clock::Utc)] {
+            let mut format = A50Format::default();
+            let line = report(Some([transmission_us - 100_000, transmission_us]));
+            assert_eq!(cut(&mut format, &line).0.len(), 1);
+            assert_eq!(format.clock(), expected);
+        }
     }
 
     #[test]

@@ -3,6 +3,8 @@
 //! The emulator of a sensor encodes the sensor's values as the bytes that the sensor would have sent, so that the
 //! ordinary decoder can read them.
 
+use std::collections::BTreeMap;
+
 use headrace_config::{ConfigError, Section};
 use headrace_geometry::frames::Rot;
 use headrace_geometry::math::{self, PI};
@@ -105,6 +107,8 @@ pub struct Csv {
     is_zoned: Option<bool>,
     targets: Vec<Target>,
     header_passed: bool,
+    /// Number of lost readings, by reason, in rows that already have a loss for another reading.
+    further_losses: BTreeMap<&'static str, u64>,
 }
 
 /// Form of the times in a table.
@@ -183,6 +187,7 @@ impl Csv {
             is_zoned: None,
             targets,
             header_passed: false,
+            further_losses: BTreeMap::new(),
         })
     }
 
@@ -196,11 +201,16 @@ impl Csv {
         }
         let time = cells.get(self.time.0).copied().unwrap_or_default();
         let stamp_ns = self.stamp_ns(time)?;
-        let mut whole = Ok(());
+        let mut first = Ok(());
         for target in &mut self.targets {
-            whole = whole.and(target.tell(stamp_ns, &cells, out));
+            let Err(why) = target.tell(stamp_ns, &cells, out) else { continue };
+            if first.is_ok() {
+                first = Err(why);
+            } else {
+                *self.further_losses.entry(why).or_default() += 1;
+            }
         }
-        whole
+        first
     }
 
     fn stamp_ns(&mut self, time: &str) -> Result<u64, &'static str> {
@@ -228,7 +238,11 @@ impl Format for Csv {
     fn report(&self) -> ImportReport {
         let assumed = self.targets.iter().filter(|target| target.has_assumed_speed);
         let remarks = assumed.map(|target| target.sensor.assumed_speed()).collect();
-        ImportReport { remarks, ..ImportReport::default() }
+        let further = self.further_losses.iter();
+        let losses = further
+            .map(|(why, count)| format!("{why}: {count} more, in rows with a loss for another sensor"))
+            .collect();
+        ImportReport { losses, remarks }
     }
 
     fn step(&mut self, front: &[u8], end: bool, out: &mut Vec<Entry>) -> Step {
@@ -284,14 +298,14 @@ impl Target {
         let at = column(section, "column", names)?;
         if let Some((_, doubt, units)) = doubts.iter().find(|(doubt, ..)| *doubt == name) {
             let is_flag = units.is_empty();
-            let factor = if is_flag { 1.0 } else { factor(section, units)? };
-            self.doubts.push((*doubt, Column { at, factor, offset: 0.0 }));
+            let [unit, factor] = if is_flag { [1.0; 2] } else { unit_and_factor(section, units)? };
+            self.doubts.push((*doubt, Column { at, factor: unit * factor, offset: 0.0 }));
             return Ok(());
         }
         let Some((_, slot, units)) = quantities.iter().find(|(quantity, ..)| *quantity == name) else {
             return Ok(());
         };
-        let place = self.place(section, name, at, factor(section, units)?)?;
+        let place = self.place(section, name, at, unit_and_factor(section, units)?)?;
         if let Some(column) = self.columns.get_mut(*slot)
             && column.replace(place).is_some()
         {
@@ -306,9 +320,10 @@ impl Target {
         section: &Section<'_>,
         name: &str,
         at: usize,
-        factor: f64,
+        [unit, factor]: [f64; 2],
     ) -> Result<Column, ConfigError> {
         let site = self.sensor.site;
+        let factor = unit * factor;
         if name == "range" {
             let mps = section.number("sound_speed_mps", SOUND_SPEED_MPS)?;
             self.has_assumed_speed = mps.is_none();
@@ -323,9 +338,9 @@ impl Target {
             "gauge_pressure" => (1.0, site.surface_pressure_pa),
             _ => (1.0, 0.0),
         };
-        let unit = factor * scale;
         let offset = section.number("offset", -1e9..=1e9)?.unwrap_or(0.0);
-        Ok(Column { at, factor: unit, offset: zero_pa + offset * unit })
+        // The mapping's factor applies to the table's numbers only, not to the offset.
+        Ok(Column { at, factor: factor * scale, offset: zero_pa + offset * unit * scale })
     }
 
     /// Checks that no quantity lacks a column, and that a head's ranges in the table's first rows can be ranges.
@@ -349,7 +364,9 @@ impl Target {
         let pings = rows
             .iter()
             .filter_map(|row| Some((*row.get(time_at)?, *row.get(angle.at)?, *row.get(range.at)?)));
-        let pings: Vec<_> = pings.collect();
+        // Rows without a range of this head may lie between the points of an echo.
+        let pings: Vec<_> =
+            pings.filter(|(_, angle, range)| !angle.is_empty() && !range.is_empty()).collect();
         let is_one_ping = |rows: &[(&str, &str, &str)]| match rows {
             [one, two, three] => {
                 (one.0, one.1) == (two.0, two.1)
@@ -380,8 +397,10 @@ impl Target {
         if self.columns.iter().all(|place| text(place).is_empty()) {
             return Ok(());
         }
+        let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
+        let has_no_echo = self.sensor.is_head() && empty(1);
         let doubt = self
-            .doubt(cells)
+            .doubt(cells, has_no_echo)
             .ok_or("rows whose confidence, validity, status, sd or variance is missing or not allowed")?;
         let mut values = [None; SLOTS];
         for (value, place) in values.iter_mut().zip(&self.columns) {
@@ -389,8 +408,7 @@ impl Target {
             let number = text(place).parse::<f64>().ok().map(|number| number * factor + offset);
             *value = number.filter(|number| number.is_finite());
         }
-        let empty = |slot: usize| self.columns.get(slot).is_none_or(|place| text(place).is_empty());
-        let Some(value) = value(self.sensor.sense, values, empty(1)) else {
+        let Some(value) = value(self.sensor.sense, values, has_no_echo) else {
             return Err("rows with a cell that isn't a number");
         };
         let (value, is_beyond) = self.sensor.within_reach(value);
@@ -407,13 +425,19 @@ impl Target {
     }
 
     /// Parses the doubt that a row states about the sensor's values. The worst of several statements counts.
-    fn doubt(&self, cells: &[&str]) -> Option<Doubt> {
+    ///
+    /// Confidence, sd and variance belong to a range. Without an echo, they are ignored.
+    fn doubt(&self, cells: &[&str], has_no_echo: bool) -> Option<Doubt> {
         let mut doubt = Doubt::NONE;
         for (meaning, Column { at, factor, .. }) in &self.doubts {
+            let is_flag = matches!(meaning, Doubtful::Valid | Doubtful::Status);
+            if has_no_echo && !is_flag {
+                continue;
+            }
             let text = cells.get(*at).copied().unwrap_or_default();
             let number = match text.to_ascii_lowercase().as_str() {
-                "true" => 1.0,
-                "false" => 0.0,
+                "true" if is_flag => 1.0,
+                "false" if is_flag => 0.0,
                 number => number.parse::<f64>().ok().filter(|number| number.is_finite())? * factor,
             };
             match meaning {
@@ -436,10 +460,10 @@ impl Target {
     }
 }
 
-/// Reads the unit and the factor of a column. Returns the factor that converts its numbers to SI units.
-fn factor(section: &Section<'_>, units: &[(&str, f64)]) -> Result<f64, ConfigError> {
+/// Reads the unit of a column, as its factor to SI units, and the factor that the mapping gives.
+fn unit_and_factor(section: &Section<'_>, units: &[(&str, f64)]) -> Result<[f64; 2], ConfigError> {
     let unit = section.required("unit", section.choice("unit", units)?)?;
-    Ok(unit * section.number("factor", -1e9..=1e9)?.unwrap_or(1.0))
+    Ok([unit, section.number("factor", -1e9..=1e9)?.unwrap_or(1.0)])
 }
 
 /// Builds a sensor's value from the numbers in a row; `None` if a number is missing.

@@ -84,6 +84,12 @@ pub(super) enum Unsent {
 pub(super) const TOO_UNCERTAIN: &str =
     "readings whose variance exceeds the noise in [navigation] of the vehicle file, withheld";
 
+/// Largest stated sd of a turn rate or force, as a multiple of the noise that the filter assumes.
+///
+/// The noise is that of a sample of [`PERIOD`]. Stated sds contain more than white noise, such as the bias. The factor of 10 allows for this. It is a choice, not a
+/// measurement.
+const INERTIAL_SD_FACTOR: f64 = 10.0;
+
 /// Least confidence of a range that a head reports as certain. The same limit is the default of echosounders.
 const LEAST_CONFIDENCE: f64 = 0.5;
 
@@ -100,8 +106,9 @@ pub(super) struct EmulatedSensor {
     pub(super) site: Site,
     /// Noise variance that the vehicle file states for the sensor, in the square of the SI unit.
     usual_variance: f64,
-    /// Largest variances of heading, turn rate and specific force of an inertial unit with a use for navigation.
-    inertial_variances: [f64; 3],
+    /// Largest variances of an inertial unit's tilt without turn rate or specific force, of its heading, turn rate and
+    /// specific force.
+    inertial_variances: [f64; 4],
     emulated: Emulated,
 }
 
@@ -144,8 +151,10 @@ impl EmulatedSensor {
         let declared = navigation.usual_variance(device.specification().kind);
         let pa_per_m = site.density_kgpm3 * site.gravity_mps2;
         let deviation = navigation.heading.reach;
-        // Data with more noise than the filter assumes without them are of no use.
-        let useless = |density: f64| density * density / PERIOD.as_secs_f64();
+        let most_variance = |density: f64| {
+            let sd = INERTIAL_SD_FACTOR * density;
+            sd * sd / PERIOD.as_secs_f64()
+        };
         Self {
             id: id.to_owned(),
             sense: device.sense(),
@@ -154,25 +163,38 @@ impl EmulatedSensor {
             // The noise of a depth sensor is declared in metres.
             usual_variance: declared * if device.sense() == Sense::Depth { pa_per_m * pa_per_m } else { 1.0 },
             inertial_variances: [
+                navigation.attitude_sd_rad * navigation.attitude_sd_rad,
                 navigation.heading_sd_rad * navigation.heading_sd_rad + deviation * deviation,
-                useless(navigation.blind_rate_noise),
-                useless(navigation.blind_force_noise),
+                most_variance(navigation.rate_noise),
+                most_variance(navigation.force_noise),
             ],
             emulated: device.emulator(&setup),
         }
     }
 
     /// Returns whether orientation, turn rate and specific force of an inertial unit have variances that their messages
-    /// need not state. `variances` are those of tilt, heading, turn rate and specific force.
-    pub(super) fn are_certain(&self, [tilt, heading, rate, force]: [f64; 4]) -> [bool; 3] {
-        let [most_heading, most_rate, most_force] = self.inertial_variances;
-        [tilt <= self.usual_variance && heading <= most_heading, rate <= most_rate, force <= most_force]
+    /// need not state. `variances` are those of tilt, heading, turn rate and specific force. `has_rate` and `has_force`
+    /// tell whether the message has a turn rate and a specific force.
+    pub(super) fn are_certain(
+        &self,
+        [tilt, heading, rate, force]: [f64; 4],
+        has_rate: bool,
+        has_force: bool,
+    ) -> [bool; 3] {
+        let [tilt_alone, most_heading, most_rate, most_force] = self.inertial_variances;
+        let (is_rate_certain, is_force_certain) = (rate <= most_rate, force <= most_force);
+        // The filter assumes less noise of the tilt if turn rate or specific force is missing.
+        let is_complete = has_rate && is_rate_certain && has_force && is_force_certain;
+        let most_tilt = if is_complete { self.usual_variance } else { tilt_alone };
+        [tilt <= most_tilt && heading <= most_heading, is_rate_certain, is_force_certain]
     }
 
     /// Returns the doubt about a value for which the sensor's messages have no field, as text.
     fn doubt_without_field(&self, doubt: &Doubt) -> Option<&'static str> {
         let has_confidence = matches!(self.emulated, Emulated::Echosounder(_));
-        if matches!(self.emulated, Emulated::VelocityLog(_)) {
+        let has_validity = matches!(self.emulated, Emulated::VelocityLog(_));
+        if has_validity && (!doubt.is_valid || doubt.status != 0) {
+            // The replay withholds the reading because of its validity or status.
             None
         } else if !doubt.is_valid {
             Some("readings marked as invalid, withheld: the sensor's messages have no field for this")

@@ -44,7 +44,17 @@ pub enum Clock {
     Own,
 }
 
+/// Timestamps earlier than this time in 2001 don't count as UTC.
+const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
+
 impl Clock {
+    /// Returns the epoch of a file's timestamps, which should be UTC, from the first of them.
+    ///
+    /// An early first timestamp means that the recording machine's clock was not set.
+    pub(super) fn of_first(first_ns: Option<u64>) -> Self {
+        if first_ns.is_some_and(|first_ns| first_ns >= FIRST_UTC_NS) { Self::Utc } else { Self::Own }
+    }
+
     /// Returns the epoch's name in the log's metadata.
     pub fn as_str(self) -> &'static str {
         match self {

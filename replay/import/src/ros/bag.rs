@@ -21,8 +21,6 @@ const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 const MOST_HEADER: usize = 1 << 16;
 /// Maximum number of bytes read from the definitions at the end of a bag.
 const MOST_INDEX: u64 = 64 << 20;
-/// Timestamps earlier than this time in 2001 don't count as UTC.
-pub(super) const FIRST_UTC_NS: u64 = 1_000_000_000_000_000_000;
 
 const NO_RECORD: &str = "no bag record";
 
@@ -168,7 +166,7 @@ fn record(front: &[u8]) -> Result<Record<'_>, Stop<'_>> {
 
 impl Format for Bag {
     fn clock(&self) -> Clock {
-        if self.first_ns.is_some_and(|first_ns| first_ns >= FIRST_UTC_NS) { Clock::Utc } else { Clock::Own }
+        Clock::of_first(self.first_ns)
     }
 
     fn most_held(&self) -> usize {

@@ -55,8 +55,8 @@ pub(super) struct Feed {
 /// Losses of the parts of an inertial message whose variances are too large.
 const UNCERTAIN_PARTS: [&str; 3] = [
     "readings of orientation whose variance exceeds the noise in [navigation] of the vehicle file, withheld",
-    "readings of turn rate whose variance exceeds that of navigation without gyro, withheld",
-    "readings of specific force whose variance exceeds that of navigation without accelerometer, withheld",
+    "readings of turn rate whose sd exceeds 10 times the noise of `gyro_noise_degps_rthz`, withheld",
+    "readings of specific force whose sd exceeds 10 times the noise of `accel_noise_mps2_rthz`, withheld",
 ];
 
 /// Lowest plausible pressure under water, Pa: half an atmosphere.
@@ -109,9 +109,14 @@ impl Feed {
         let value = match &read.values {
             Values::Beams(beams) => return self.beams(beams, (at_ns, stamped), out),
             Values::Inertial { wxyz, rate_radps, force_mps2, variances } => {
-                let [attitude, rate, force] = self.sensor.are_certain(*variances);
-                for (is_certain, why) in [attitude, rate, force].into_iter().zip(UNCERTAIN_PARTS) {
-                    if !is_certain {
+                let is_present = [wxyz.is_some(), rate_radps.is_some(), force_mps2.is_some()];
+                let [_, has_rate, has_force] = is_present;
+                let [attitude, rate, force] = self.sensor.are_certain(*variances, has_rate, has_force);
+                let is_withheld = [!attitude, !rate, !force];
+                for ((is_present, is_withheld), why) in
+                    is_present.into_iter().zip(is_withheld).zip(UNCERTAIN_PARTS)
+                {
+                    if is_present && is_withheld {
                         *self.lost.entry(why).or_default() += 1;
                     }
                 }

@@ -6,7 +6,6 @@
 use std::collections::BTreeMap;
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 
-use super::bag::FIRST_UTC_NS;
 use super::feeds::{Feeds, Topic};
 use super::message::Type;
 use super::wire::Encoding;
@@ -119,7 +118,7 @@ impl<R: Read + Seek> Source for Mcap<R> {
     }
 
     fn clock(&self) -> Clock {
-        if self.first_ns.is_some_and(|first_ns| first_ns >= FIRST_UTC_NS) { Clock::Utc } else { Clock::Own }
+        Clock::of_first(self.first_ns)
     }
 
     fn reach_ns(&self) -> u64 {

@@ -134,7 +134,7 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
         }
         Type::FluidPressure => {
             let [pressure, variance] = wire.doubles()?;
-            doubt.variance = variance;
+            doubt.variance = stated(variance);
             Values::Scalar(pressure)
         }
         Type::LaserScan => Values::Beams(scan(wire)?),
@@ -147,7 +147,7 @@ fn fields<'a>(of: Type, wire: &mut Wire<'a>) -> Option<Result<Read<'a>, &'static
             let [x, y, z, _, _, _] = wire.doubles()?;
             if of == Type::TwistWithCovariance {
                 let covariance: [f64; 36] = wire.doubles()?;
-                doubt.variance = largest(&covariance, &[0, 7, 14]);
+                doubt.variance = stated(largest(&covariance, &[0, 7, 14]));
             }
             Values::Velocity([x, y, z])
         }
@@ -195,13 +195,19 @@ fn is_minus_one(value: f64) -> bool {
     value.to_bits() == (-1.0_f64).to_bits()
 }
 
-/// Parses a range and its variance, which is 0 if it isn't stated.
+/// Returns a message's variance, or 0 if its value is -1, with which drivers state that they don't know it.
+fn stated(variance: f64) -> f64 {
+    if is_minus_one(variance) { 0.0 } else { variance }
+}
+
+/// Parses a range and its variance, which is 0 if it isn't stated or if there was no echo.
 fn range(wire: &mut Wire<'_>) -> Option<(Values, f64)> {
     let _radiation = wire.u8()?;
     let [_field_of_view, least, most, range] = wire.singles()?;
     // Only newer definitions of this message end with a variance.
     let variance = if wire.is_done() { 0.0 } else { wire.f32()?.into() };
-    Some((Values::Range(heard(range, least, most)), variance))
+    let range_m = heard(range, least, most);
+    Some((Values::Range(range_m), if range_m.is_some() { stated(variance) } else { 0.0 }))
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use headrace_vehicle::VehicleConfig;
 
 use super::formats::cut;
 use crate::csv::Csv;
+use crate::emulated::TOO_UNCERTAIN;
 use crate::entry::{Clock, Entry, ImportReport};
 use crate::ping::PingFormat;
 use crate::ros::{Encoding, Feeds, Topic, Type};
@@ -97,23 +98,26 @@ fn validity_status_and_figure_of_merit_of_a_table_become_those_of_the_velocity_l
     let further =
         [column("dvl", "valid", ""), column("dvl", "status", ""), column("dvl", "sd", "unit = \"m/s\"")];
     let rows = "t,velocity_x,velocity_y,velocity_z,valid,status,sd\n\
-                1,0.1,0,0,1,0,0.25\n2,0.1,0,0,false,0,0.25\n3,0.1,0,0,1,4,0.25\n4,0.1,0,0,1,0,0.25\n";
+                1,0.1,0,0,1,0,0.015625\n2,0.1,0,0,false,0,0.25\n3,0.1,0,0,1,4,0.25\n4,0.1,0,0,1,0,0.015625\n\
+                5,0.1,0,0,1,0,0.25\n";
     let (entries, lost) = read(&velocity(&further), rows);
     let lines: Vec<String> = entries.iter().map(text).collect();
-    assert_eq!((lines.len(), lost.len()), (4, 0), "{lost:?}");
+    // The navigation assumes 0.02 m/s, the default of `velocity_sd_mps`, for each valid velocity.
+    assert_eq!((lines.len(), &lost[..]), (4, &[TOO_UNCERTAIN][..]));
     for (line, words) in lines.iter().zip([
-        ["\"fom\":0.25,", "\"velocity_valid\":true,\"status\":0,"],
+        ["\"fom\":0.015625,", "\"velocity_valid\":true,\"status\":0,"],
         ["\"fom\":0.25000000000000006,", "\"velocity_valid\":false,\"status\":0,"],
         ["\"fom\":0.25,", "\"velocity_valid\":true,\"status\":4,"],
         // Equal figures of merit alternate by one unit in the last place, because equal reports count as repeats.
-        ["\"fom\":0.25000000000000006,", "\"velocity_valid\":true,\"status\":0,"],
+        ["\"fom\":0.015625000000000003,", "\"velocity_valid\":true,\"status\":0,"],
     ]) {
         assert!(words.iter().all(|word| line.contains(word)), "{words:?} is not in {line}");
     }
     let variance = [column("dvl", "variance", "unit = \"m2/s2\"")];
-    let (entries, _) =
-        read(&velocity(&variance), "t,velocity_x,velocity_y,velocity_z,variance\n1,0.1,0,0,1000000\n");
-    assert!(text(&entries[0]).contains("\"fom\":1000.0,"), "{}", text(&entries[0]));
+    let rows = "t,velocity_x,velocity_y,velocity_z,variance\n1,0.1,0,0,0.000244140625\n2,0.1,0,0,0.09\n";
+    let (entries, lost) = read(&velocity(&variance), rows);
+    assert_eq!((entries.len(), &lost[..]), (1, &[TOO_UNCERTAIN][..]));
+    assert!(text(&entries[0]).contains("\"fom\":0.015625,"), "{}", text(&entries[0]));
 }
 
 #[test]
@@ -144,6 +148,55 @@ fn doubt_without_a_field_in_the_message_is_withheld_with_its_reason() {
 }
 
 #[test]
+fn head_without_an_echo_needs_no_confidence() {
+    let head = [
+        column("head", "angle", "unit = \"deg\""),
+        column("head", "range", "unit = \"m\""),
+        column("head", "confidence", "unit = \"ratio\""),
+        column("head", "sd", "unit = \"m\""),
+        column("head", "valid", ""),
+    ];
+    let rows = "t,angle,range,confidence,sd,valid\n1,0,,0,9,1\n2,2.4,,,,1\n3,4.8,3,,0,1\n4,7.2,,0,0,0\n";
+    let (entries, lost) = read(&head, rows);
+    assert_eq!((entries.len(), lost.len()), (2, 2), "{lost:?}");
+    assert!(lost[0].starts_with("rows whose confidence") && lost[1].contains("invalid"), "{lost:?}");
+}
+
+#[test]
+fn words_for_flags_are_not_numbers() {
+    let columns = [
+        column("ping", "range", "unit = \"m\""),
+        column("ping", "confidence", "unit = \"ratio\""),
+        column("ping", "sd", "unit = \"m\""),
+        column("ping", "valid", ""),
+        column("ping", "status", ""),
+    ];
+    let rows = "t,range,confidence,sd,valid,status\n1,3,1,0,true,false\n2,3,true,0,1,0\n3,3,1,false,1,0\n";
+    let (entries, lost) = read(&columns, rows);
+    assert_eq!((entries.len(), lost.len()), (1, 2), "{lost:?}");
+    assert!(lost.iter().all(|why| why.starts_with("rows whose confidence")), "{lost:?}");
+}
+
+#[test]
+fn each_lost_reading_of_a_row_is_counted() {
+    let columns = [
+        column("depth", "pressure", "unit = \"Pa\""),
+        column("depth", "valid", ""),
+        column("ping", "range", "unit = \"m\""),
+        column("ping", "status", ""),
+    ];
+    let rows = "t,pressure,valid,range,status\n1,150000,0,3,1\n2,150000,1,3,1\n3,150000,0,3,1\n";
+    let mut csv = table(&columns, rows).unwrap();
+    let (entries, lost, _) = cut(&mut csv, rows.as_bytes());
+    let reasons: Vec<&str> = lost.iter().map(|(_, why)| why.split(',').next().unwrap()).collect();
+    let [invalid, status] = ["readings marked as invalid", "readings with a status other than 0"];
+    assert_eq!((entries.len(), &reasons[..]), (1, &[invalid, status, invalid][..]));
+    let losses = crate::Format::report(&csv).losses;
+    assert_eq!(losses.len(), 1, "{losses:?}");
+    assert!(losses[0].starts_with(status) && losses[0].contains(": 2 more, in rows"), "{losses:?}");
+}
+
+#[test]
 fn table_with_the_points_of_echoes_is_refused() {
     let head = [column("head", "angle", "unit = \"deg\""), column("head", "range", "unit = \"m\"")];
     let points = (0..396).map(|bin| format!("1.0,12.5,{}.{:02}\n", bin / 40, bin % 40));
@@ -153,6 +206,9 @@ fn table_with_the_points_of_echoes_is_refused() {
         error.contains("three ranges of sensor \"head\" at one time and angle: the points of an echo"),
         "{error}"
     );
+    // Rows for other sensors, and points without a range, lie between the points.
+    let sparse = "t,angle,range\n1,12.5,3.1\n1,,\n1,12.5,\n1,12.5,3.2\n1.1,,\n1,12.5,3.3\n";
+    assert!(table(&head, sparse).is_err());
     // A head that turns by a step for each ping, in a table with coarse times.
     assert!(table(&head, "t,angle,range\n1,0,3.1\n1,2.4,3.2\n1,4.8,3.3\n").is_ok());
 }
@@ -186,29 +242,40 @@ fn variance_of_a_ros_velocity_becomes_the_figure_of_merit() {
         }
         doubles(&[&[0.3, 0.0, 0.0, 0.0, 0.0, 0.0][..], &covariance].concat())
     };
-    let messages = [twist([1e6, 0.01, 0.01]), twist([0.01, 0.04, 0.01]), twist([f64::NAN, 0.0, 0.0])];
+    let messages = [
+        twist([1e6, 0.01, 0.01]),
+        twist([1e-4, 0.000_244_140_625, 1e-4]),
+        twist([f64::NAN, 0.0, 0.0]),
+        twist([0.09, 1e-4, 1e-4]),
+        // The driver doesn't know the variances.
+        twist([-1.0; 3]),
+    ];
     let (entries, report) = feed("dvl", "geometry_msgs/TwistWithCovarianceStamped", "", &messages);
     let lines: Vec<String> = entries.iter().map(text).collect();
-    assert!(lines[0].contains("\"fom\":1000.0,") && lines[1].contains("\"fom\":0.2"), "{lines:?}");
-    assert!(lines[1].contains("\"velocity_valid\":true") && lines[2].contains("\"velocity_valid\":false"));
-    assert_eq!(report.losses, [""; 0]);
+    assert_eq!(lines.len(), 2);
+    assert!(lines[0].contains("\"fom\":0.015625,"), "{lines:?}");
+    assert!(lines.iter().all(|line| line.contains("\"velocity_valid\":true")), "{lines:?}");
+    assert_eq!(report.losses, [format!("/topic: 3 {TOO_UNCERTAIN}")]);
 }
 
 #[test]
 fn ros_values_with_large_variances_are_withheld() {
-    let pressures = [[150_000.0, 0.0], [150_000.0, 100.0], [150_000.0, 1e6]].map(|it| doubles(&it));
+    let pressures = [0.0, 100.0, 1e6, -1.0].map(|variance| doubles(&[150_000.0, variance]));
     let (entries, report) = feed("depth", "sensor_msgs/FluidPressure", "", &pressures);
-    assert_eq!(
-        (entries.len(), &report.losses[..]),
-        (2, &[format!("/topic: 1 {}", crate::emulated::TOO_UNCERTAIN)][..])
-    );
-    let range = |variance: f32| {
+    assert_eq!((entries.len(), &report.losses[..]), (3, &[format!("/topic: 1 {TOO_UNCERTAIN}")][..]));
+    let range = |range_m: f32, variance: f32| {
         let singles: Vec<u8> =
-            [0.1, 0.0, 50.0, 4.0, variance].into_iter().flat_map(f32::to_le_bytes).collect();
+            [0.1, 0.0, 50.0, range_m, variance].into_iter().flat_map(f32::to_le_bytes).collect();
         [&[0][..], &singles].concat()
     };
-    let (entries, report) = feed("ping", "sensor_msgs/Range", "", &[range(0.0), range(1e6)]);
-    assert_eq!((entries.len(), report.losses.len()), (1, 1), "{:?}", report.losses);
+    // The last message has no echo, because its range is beyond its limit of 50 m.
+    let messages = [range(4.0, 0.0), range(4.0, 1e6), range(4.0, -1.0), range(60.0, 1e6)];
+    let (entries, report) = feed("ping", "sensor_msgs/Range", "", &messages);
+    assert_eq!((entries.len(), report.losses.len()), (3, 1), "{:?}", report.losses);
+}
+
+#[test]
+fn parts_of_ros_inertial_messages_with_large_variances_are_withheld() {
     let imu = |variances: [f64; 4]| {
         let [tilt, heading, rate, force] = variances;
         let covariance = |x: f64, z: f64| [x, 0.0, 0.0, 0.0, x, 0.0, 0.0, 0.0, z];
@@ -222,10 +289,21 @@ fn ros_values_with_large_variances_are_withheld() {
         ];
         doubles(&parts.concat())
     };
-    let messages =
-        [[1e-4; 4], [1e6, 0.0, 0.0, 0.0], [0.0, 1e6, 0.0, 0.0], [0.0, 0.0, 1e6, 0.0], [0.0, 0.0, 0.0, 1e6]];
+    // For this unit, the largest sds are 0.013 rad/s and 0.059 m/s^2.
+    let messages = [
+        [1e-4; 4],
+        [1e6, 0.0, 0.0, 0.0],
+        [0.0, 1e6, 0.0, 0.0],
+        [0.0, 0.0, 4e-4, 0.0],
+        [0.0, 0.0, 0.0, 0.01],
+        // A tilt with an sd of 1.4 degrees is certain enough only with turn rate and specific force.
+        [6e-4, 0.0, 0.0, 0.0],
+        [6e-4, 0.0, 1e6, 0.0],
+        // An absent orientation isn't withheld.
+        [-1.0, 1e6, 0.0, 0.0],
+    ];
     let (_, report) = feed("imu", "sensor_msgs/Imu", "", &messages.map(imu));
-    for words in ["2 readings of orientation", "1 readings of turn rate", "1 readings of specific force"] {
+    for words in ["3 readings of orientation", "2 readings of turn rate", "1 readings of specific force"] {
         assert!(
             report.losses.iter().any(|loss| loss.contains(words)),
             "{words:?} is not in {:?}",
@@ -283,6 +361,7 @@ fn depths_and_gauge_pressures_become_absolute_pressures() {
     for (quantity, keys, cell, expected_pa) in [
         ("depth", "unit = \"m\"\noffset = 0.5", "12", site.pressure_pa(12.5)),
         ("depth", "unit = \"cm\"\nfactor = -1", "-250", site.pressure_pa(2.5)),
+        ("depth", "unit = \"m\"\nfactor = -1\noffset = 0.5", "-12", site.pressure_pa(12.5)),
         ("gauge_pressure", "unit = \"kPa\"", "120", site.surface_pressure_pa + 120_000.0),
         ("pressure", "unit = \"mbar\"\noffset = -3", "1503", 150_000.0),
     ] {
