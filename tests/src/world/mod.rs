@@ -410,7 +410,10 @@ impl DiveResult {
         folder: &Folder,
         sabotage: Option<Sabotage>,
     ) -> Result<Box<Replayed>, String> {
-        let (number, mut left) = (self.certain % self.left.len(), self.left.clone());
+        let mut left = self.left.clone();
+        // After a power cut, the last file may be empty. Nothing can be changed in it.
+        let filled: Vec<usize> = (0..left.len()).filter(|number| !left[*number].bytes.is_empty()).collect();
+        let number = filled.get(self.certain % filled.len().max(1)).copied().unwrap_or_default();
         let own = &mut left[number].bytes;
         // In half of the worlds, a part that is to be doubled or joined is cut before.
         if change == LogChange::Cut || change != LogChange::Reordered && self.certain.is_multiple_of(2) {
