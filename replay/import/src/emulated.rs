@@ -86,8 +86,8 @@ pub(super) const TOO_UNCERTAIN: &str =
 
 /// Largest stated sd of a turn rate or force, as a multiple of the noise that the filter assumes.
 ///
-/// The noise is that of a sample of [`PERIOD`]. Stated sds contain more than white noise, such as the bias. The factor of 10 allows for this. It is a choice, not a
-/// measurement.
+/// The noise is that of a sample of [`PERIOD`]. Stated sds contain more than white noise, such as the bias. The factor of
+/// 10 allows for this. It is a choice, not a measurement.
 const INERTIAL_SD_FACTOR: f64 = 10.0;
 
 /// Least confidence of a range that a head reports as certain. The same limit is the default of echosounders.
