@@ -151,7 +151,7 @@ pub(crate) enum Command {
     /// List the dives that are recorded in a folder, with the metres by verdict of their reports.
     ///
     /// Logs aren't replayed. Interrupted dives and dives without a report are named, with the command that
-    /// continues the dive or makes the report. Exit code 3 if a log can't be read.
+    /// continues the dive or makes the report. Exit code 3 if a log can't be read or data is missing.
     #[command(after_help = "Example:\n  headrace dives\n  headrace dives /var/lib/headrace --json")]
     Dives(Dives),
     /// List the notes of a recorded dive, and write the recordings of its voice notes as files.
